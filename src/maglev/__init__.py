@@ -1,0 +1,1 @@
+"""Dynamic reliability of high-speed EMS maglev trains on guideway bridges."""
