@@ -1,0 +1,819 @@
+"""What is given: every physical parameter, in SI, with its meaning, source and confidence.
+
+One frozen class per physical thing.  The configuration file writes a quantity with its unit
+(``"24.768 m"``, ``"430 km/h"``); it is converted to SI once, here, and a wrong dimension, an unknown
+key or a value out of range is refused with one sentence that names the key.  The JSON schema of the
+configuration and the parameter tables of the documentation are made from these classes.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, Literal
+
+import pint
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
+
+SOURCES = {
+    "P": "adaptive-surrogate and PDEM paper, J. Low Freq. Noise Vib. Act. Control (2024), "
+    "doi 10.1177/14613484241279033",
+    "S1": "sister paper on controller gains, J. Southwest Jiaotong Univ. (2024), "
+    "doi 10.3969/j.issn.0258-2724.20230534, abstract",
+    "W": "Wang, Xu et al., Veh. Syst. Dyn. 58(2):161-191 (2020), abstract",
+    "M": "public Shanghai Transrapid parameter set and 600 km/h multibody car, repository "
+    "PPKKIO/maglev-project-based-on-deep-learning, numbers only",
+    "H": "High-speed Railway 4 (2026) 124-129, second-hand",
+    "D": "derived from the other sources",
+    "A": "assumed",
+}
+"""What the source letters in the parameter tables stand for."""
+
+CONFIDENCE = {"H": "high", "M": "medium", "L": "low"}
+"""How far a value can be trusted."""
+
+
+@lru_cache(maxsize=1)
+def _units() -> pint.UnitRegistry:
+    return pint.UnitRegistry()
+
+
+def quantity(
+    unit: str,
+    meaning: str,
+    default: float | str,
+    *,
+    source: str,
+    confidence: Literal["H", "M", "L"],
+    minimum: float | None = None,
+    above: float | None = None,
+    below: float | None = None,
+    optional: bool = False,
+) -> Any:
+    """Describe a dimensioned parameter: its SI unit, meaning, default, source and confidence.
+
+    Parameters
+    ----------
+    unit
+        SI unit of the stored number, in the notation of pint; ``""`` for a pure number.
+    meaning
+        What the number is, with its symbol.
+    default
+        Value in ``unit``, or a text with its own unit such as ``"430 km/h"``.
+    source
+        Letters of `SOURCES`, separated by ``", "``.
+    confidence
+        A letter of `CONFIDENCE`.
+    minimum, above, below
+        Bounds in ``unit``: at least, strictly more than, strictly less than.
+    optional
+        Whether the configuration may say ``null``.
+
+    Returns
+    -------
+    field
+        A pydantic field that carries all this for the check, the schema and the tables.
+    """
+    if unit:
+        schema_type: dict[str, Any] = {
+            "type": ["string", "null"] if optional else "string",
+            "pattern": r"^\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*\S.*$",
+        }
+    else:
+        schema_type = {}
+    extra = {"unit": unit, "source": source, "confidence": confidence, **schema_type}
+    if isinstance(default, str):
+        extra["default"] = default
+    elif default is not None and unit:
+        extra["default"] = f"{default:.12g} {unit}"
+    bounds: dict[str, float] = {}
+    if minimum is not None:
+        bounds["ge"] = minimum
+    if above is not None:
+        bounds["gt"] = above
+    if below is not None:
+        bounds["lt"] = below
+    if isinstance(default, str):
+        default = _in_unit(default, unit, "default")
+    elif default is not None:
+        default = float(default)
+    return Field(
+        default, description=meaning, json_schema_extra=extra, allow_inf_nan=False, **bounds
+    )
+
+
+def _in_unit(text: str, unit: str, key: str) -> float:
+    """Convert a text such as ``"430 km/h"`` to a number in ``unit``."""
+    try:
+        value = _units().Quantity(text)
+    except (pint.errors.PintError, AssertionError, ValueError, TypeError, SyntaxError) as error:
+        raise ValueError(
+            f"{key} must be a number with a unit of {unit}, got {text!r}, which cannot be read"
+        ) from error
+    except Exception as error:  # pint lets its tokenizer's own errors through
+        raise ValueError(
+            f"{key} must be a number with a unit of {unit}, got {text!r}, which cannot be read"
+        ) from error
+    if not isinstance(value, pint.Quantity) or not value.is_compatible_with(unit):
+        raise ValueError(
+            f"{key} must be given in {unit} or a unit that converts to it, got {text!r}"
+        )
+    return float(value.to(unit).magnitude)
+
+
+class Parameters(BaseModel):
+    """Base of all parameter classes: frozen, no unknown keys, quantities read with their unit."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_units(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        converted = dict(data)
+        for name, value in data.items():
+            field = cls.model_fields.get(name)
+            extra = field.json_schema_extra if field else None
+            if not isinstance(extra, dict) or "unit" not in extra or value is None:
+                continue
+            unit = str(extra["unit"])
+            if isinstance(value, bool):
+                raise ValueError(f"{name} must be a number, got {value}")
+            if unit and isinstance(value, str):
+                converted[name] = _in_unit(value, unit, name)
+            elif unit:
+                raise ValueError(
+                    f"{name} must carry its unit, such as '{value} {unit}', got {value!r}"
+                )
+        return converted
+
+    def quantities(self) -> dict[str, Any]:
+        """Return the class as the configuration file would write it, units included."""
+        out: dict[str, Any] = {}
+        for name, field in type(self).model_fields.items():
+            value = getattr(self, name)
+            extra = field.json_schema_extra
+            if isinstance(value, Parameters):
+                out[name] = value.quantities()
+            elif isinstance(value, tuple) and value and isinstance(value[0], Parameters):
+                out[name] = [item.quantities() for item in value]
+            elif isinstance(extra, dict) and extra.get("unit") and value is not None:
+                out[name] = f"{value!r} {extra['unit']}"
+            elif isinstance(value, tuple):
+                out[name] = list(value)
+            else:
+                out[name] = value
+        return out
+
+
+class CarBody(Parameters):
+    """The car body, a rigid body with y, z, roll, pitch and yaw."""
+
+    mass: float = quantity(
+        "kg", "mass, loaded (empty 29 000 kg)", 39_000, source="M", confidence="M", above=0
+    )
+    roll_inertia: float = quantity(
+        "kg m^2", "moment of inertia about x, I_x", 6.5e4, source="M", confidence="M", above=0
+    )
+    pitch_inertia: float = quantity(
+        "kg m^2", "moment of inertia about y, I_y", 2.0e6, source="M", confidence="M", above=0
+    )
+    yaw_inertia: float = quantity(
+        "kg m^2", "moment of inertia about z, I_z", 2.0e6, source="M", confidence="M", above=0
+    )
+    height: float = quantity(
+        "m", "centre of mass above the deck level", 1.5, source="M", confidence="L"
+    )
+
+
+class Bogie(Parameters):
+    """Two C-frames at the bogie's ends that share y, z, pitch and yaw and roll on their own."""
+
+    mass: float = quantity(
+        "kg", "mass of the whole bogie", 2200, source="M", confidence="M", above=0
+    )
+    c_frame_roll_inertia: float = quantity(
+        "kg m^2", "roll inertia of each C-frame", 1000, source="M, A", confidence="L", above=0
+    )
+    pitch_inertia: float = quantity(
+        "kg m^2", "moment of inertia about y", 7000, source="M, A", confidence="L", above=0
+    )
+    yaw_inertia: float = quantity(
+        "kg m^2", "moment of inertia about z", 7000, source="M, A", confidence="L", above=0
+    )
+    c_frame_spacing: float = quantity(
+        "m", "distance of neighbouring C-frames", 3.096, source="P", confidence="H", above=0
+    )
+    roll_stiffness: float = quantity(
+        "N m/rad", "C-frame to C-frame, relative roll", 1e6, source="A", confidence="L", minimum=0
+    )
+    roll_damping: float = quantity(
+        "N m s/rad", "C-frame to C-frame, relative roll", 1e3, source="A", confidence="L", minimum=0
+    )
+
+
+class Rod(Parameters):
+    """A pendulum on a C-frame that carries the car body; its lower end pushes the body sideways."""
+
+    mass: float = quantity(
+        "kg", "mass, moving with the pivot", 50, source="A", confidence="L", above=0
+    )
+    inertia: float = quantity(
+        "kg m^2", "moment of inertia about the pivot", 8, source="A", confidence="L", above=0
+    )
+    length: float = quantity("m", "pivot to lower end, l", 0.5, source="A", confidence="L", above=0)
+    pivot_y: float = quantity(
+        "m",
+        "distance of the pivot from the car's centre line",
+        1.2,
+        source="A",
+        confidence="L",
+        above=0,
+    )
+    pivot_z: float = quantity(
+        "m", "pivot below the deck level (negative: above)", -0.5, source="A", confidence="L"
+    )
+    pivot_damping: float = quantity(
+        "N m s/rad", "rod against C-frame, relative roll", 10, source="A", confidence="L", minimum=0
+    )
+    end_stiffness: float = quantity(
+        "N/m", "lower end to car body, lateral", 2e5, source="M, A", confidence="L", above=0
+    )
+    end_damping: float = quantity(
+        "N s/m", "lower end to car body, lateral", 3e3, source="M, A", confidence="L", minimum=0
+    )
+
+
+class AirSpring(Parameters):
+    """Air spring between car body and C-frame, vertical."""
+
+    stiffness: float = quantity(
+        "N/m", "vertical stiffness", 2.0e5, source="M", confidence="M", above=0
+    )
+    damping: float = quantity(
+        "N s/m", "vertical damping", 5e3, source="M", confidence="M", minimum=0
+    )
+    y: float = quantity(
+        "m", "distance from the car's centre line", 1.2, source="M", confidence="M", above=0
+    )
+
+
+class Magnet(Parameters):
+    """A row of poles on one rigid magnet body, its suspension on the C-frames and its control.
+
+    The magnet hangs with both ends on neighbouring C-frames.  ``poles_per_controller`` poles share
+    one gap signal (their mean) and one current.
+    """
+
+    mass: float = quantity("kg", "mass", 600, source="H", confidence="M", above=0)
+    inertia: float = quantity(
+        "kg m^2",
+        "moment of inertia in the plane of its motion",
+        480,
+        source="H",
+        confidence="M",
+        above=0,
+    )
+    y: float = quantity(
+        "m", "distance from the car's centre line", 1.1, source="H", confidence="M", above=0
+    )
+    z: float = quantity(
+        "m", "below the deck level (negative: above)", 0.0, source="A", confidence="L"
+    )
+    end_stiffness: float = quantity(
+        "N/m", "each end to its C-frame", 1.2e7, source="M", confidence="M", above=0
+    )
+    end_damping: float = quantity(
+        "N s/m",
+        "each end to its C-frame (sources span 2.5e3 to 5e4)",
+        1e4,
+        source="M",
+        confidence="L",
+        minimum=0,
+    )
+    n_poles: int = Field(
+        12,
+        description="poles of one magnet",
+        ge=1,
+        json_schema_extra={"unit": "", "source": "P", "confidence": "H"},
+    )
+    pole_pitch: float = quantity(
+        "m", "distance of neighbouring poles", 0.258, source="P", confidence="H", above=0
+    )
+    poles_per_controller: int = Field(
+        12,
+        description="poles that share one gap signal and one current; divides n_poles",
+        ge=1,
+        json_schema_extra={"unit": "", "source": "P", "confidence": "M"},
+    )
+    gap_reference: float = quantity(
+        "m", "gap at rest, δ₀", "10 mm", source="H", confidence="H", above=0
+    )
+    current_reference: float = quantity(
+        "A", "current at rest, i₀", 25, source="M", confidence="M", above=0
+    )
+    current_max: float = quantity(
+        "A", "largest current the chopper gives, i_max", 120, source="A", confidence="L", above=0
+    )
+    preload: float | None = quantity(
+        "N",
+        "force at rest; null: what the magnet carries of the train's weight",
+        None,
+        source="A",
+        confidence="L",
+        optional=True,
+    )  # type: ignore[arg-type]
+
+    @model_validator(mode="after")
+    def _check(self) -> Magnet:
+        if self.n_poles % self.poles_per_controller:
+            raise ValueError(
+                f"poles_per_controller must divide n_poles = {self.n_poles}, got {self.poles_per_controller}"
+            )
+        if not self.current_max > self.current_reference:
+            raise ValueError(
+                f"current_max must exceed current_reference = {self.current_reference} A, got {self.current_max} A"
+            )
+        return self
+
+
+class Train(Parameters):
+    """Cars of one kind in a row, nose at the front, with shared magnets between neighbours."""
+
+    n_cars: int = Field(
+        5,
+        description="number of cars",
+        ge=1,
+        json_schema_extra={"unit": "", "source": "P", "confidence": "H"},
+    )
+    car_pitch: float = quantity(
+        "m", "distance of neighbouring cars", 24.768, source="P", confidence="H", above=0
+    )
+    car_body: CarBody = CarBody()
+    bogie: Bogie = Bogie()
+    rod: Rod = Rod()
+    air_spring: AirSpring = AirSpring()
+    suspension_magnet: Magnet = Magnet()
+    guidance_magnet: Magnet = Magnet(
+        mass="390 kg",
+        inertia="310 kg m^2",
+        y="1.465 m",
+        z="-0.18 m",
+        end_stiffness="5e6 N/m",
+        end_damping="1e4 N s/m",
+        n_poles=3,
+        pole_pitch="1.032 m",
+        poles_per_controller=3,
+        gap_reference="10 mm",
+        current_reference="25 A",
+        preload="10 kN",
+    )  # type: ignore[arg-type]
+
+    @model_validator(mode="after")
+    def _check(self) -> Train:
+        expected = 8 * self.bogie.c_frame_spacing
+        if not math.isclose(self.car_pitch, expected, rel_tol=1e-9):
+            raise ValueError(
+                f"car_pitch must be eight C-frame spacings = {expected:g} m, got {self.car_pitch:g} m"
+            )
+        return self
+
+    @property
+    def length(self) -> float:
+        """Length of the train from nose to tail [m]."""
+        return self.n_cars * self.car_pitch
+
+
+class BeamSection(Parameters):
+    """Cross-section and material of a prismatic beam along its own axis.
+
+    ``vertical`` bending is about y (displacement z), ``lateral`` bending about z (displacement y).
+    """
+
+    elastic_modulus: float = quantity(
+        "Pa", "Young's modulus E", 4.85e10, source="P", confidence="H", above=0
+    )
+    poisson_ratio: float = quantity(
+        "", "Poisson's ratio ν", 0.2, source="P", confidence="H", minimum=0, below=0.5
+    )
+    density: float = quantity("kg/m^3", "density ρ", 2551, source="P", confidence="H", above=0)
+    area: float = quantity("m^2", "area A", 2.352, source="M", confidence="M", above=0)
+    second_moment_vertical: float = quantity(
+        "m^4",
+        "second moment of area for vertical bending",
+        1.769,
+        source="M",
+        confidence="M",
+        above=0,
+    )
+    second_moment_lateral: float = quantity(
+        "m^4", "second moment of area for lateral bending", 1.2, source="A", confidence="L", above=0
+    )
+    torsion_constant: float = quantity(
+        "m^4", "Saint-Venant torsion constant J", 1.5, source="A", confidence="L", above=0
+    )
+    polar_inertia: float = quantity(
+        "kg m",
+        "mass moment of inertia about the axis per length",
+        1967,
+        source="D",
+        confidence="L",
+        above=0,
+    )
+    shear_coefficient_vertical: float = quantity(
+        "", "shear coefficient κ for vertical bending", 0.4, source="A", confidence="L", above=0
+    )
+    shear_coefficient_lateral: float = quantity(
+        "", "shear coefficient κ for lateral bending", 0.4, source="A", confidence="L", above=0
+    )
+
+    @property
+    def shear_modulus(self) -> float:
+        """Shear modulus G = E / (2 (1 + ν)) [Pa]."""
+        return self.elastic_modulus / (2 * (1 + self.poisson_ratio))
+
+    @property
+    def mass_per_length(self) -> float:
+        """Mass per length ρA [kg/m]."""
+        return self.density * self.area
+
+
+class Rail(Parameters):
+    """The functional units of one side: steel beams with free ends on rigid arms from the girder."""
+
+    section: BeamSection = BeamSection(
+        elastic_modulus="2.06e11 Pa",
+        poisson_ratio=0.3,
+        density="7850 kg/m^3",
+        area="0.045 m^2",
+        second_moment_vertical="5e-4 m^4",
+        second_moment_lateral="1e-3 m^4",
+        torsion_constant="1e-3 m^4",
+        polar_inertia="11.775 kg m",
+        shear_coefficient_vertical=0.4,
+        shear_coefficient_lateral=0.4,
+    )  # type: ignore[arg-type]
+    units_per_span: int = Field(
+        8,
+        description="functional units a span and side",
+        ge=1,
+        json_schema_extra={"unit": "", "source": "P", "confidence": "H"},
+    )
+    connectors_per_unit: int = Field(
+        4,
+        description="pairs of connectors a unit, evenly spaced, half a spacing from its ends",
+        ge=2,
+        json_schema_extra={"unit": "", "source": "P", "confidence": "H"},
+    )
+    y: float = quantity(
+        "m",
+        "rail axis (stator line) from the centre line",
+        1.1,
+        source="M",
+        confidence="M",
+        above=0,
+    )
+    z: float = quantity(
+        "m", "rail axis below the girder axis (negative: above)", -1.0, source="A", confidence="L"
+    )
+    connector_mass: float = quantity(
+        "kg/m",
+        "connectors' mass per length of one rail: girder, rails and connectors weigh 7000 kg/m together",
+        146.8,
+        source="D",
+        confidence="M",
+        minimum=0,
+    )
+    connector_longitudinal: Literal["sliding", "rigid"] = Field(
+        "sliding",
+        description="whether a connector carries force along the rail; sliding: only the first of each unit does",
+        json_schema_extra={"source": "A", "confidence": "L"},
+    )
+
+
+class Bearing(Parameters):
+    """One laminated bearing between girder end and pier top, a spring-damper in each direction."""
+
+    y: float = quantity(
+        "m", "distance from the centre line", 0.9, source="M, A", confidence="L", above=0
+    )
+    z: float = quantity("m", "below the girder axis", 1.2, source="A", confidence="L")
+    vertical_stiffness: float = quantity(
+        "N/m", "vertical", 1.0e10, source="A", confidence="L", above=0
+    )
+    lateral_stiffness: float = quantity(
+        "N/m", "lateral, keyed", 1e9, source="A", confidence="L", above=0
+    )
+    fixed_longitudinal_stiffness: float = quantity(
+        "N/m",
+        "longitudinal at the span's fixed (first) end",
+        1e9,
+        source="A",
+        confidence="L",
+        above=0,
+    )
+    free_longitudinal_stiffness: float = quantity(
+        "N/m",
+        "longitudinal at the span's free (last) end: shear of the rubber",
+        6.3e6,
+        source="D",
+        confidence="L",
+        above=0,
+    )
+    damping: float = quantity("N s/m", "each direction", 1e5, source="A", confidence="L", minimum=0)
+
+
+class Pier(Parameters):
+    """A pier, its foot fixed, with a wider cap at the top."""
+
+    height: float = quantity(
+        "m", "foot to top, cap included", 10, source="P", confidence="H", above=0
+    )
+    cap_height: float = quantity("m", "height of the cap", 1, source="A", confidence="L", above=0)
+    width_x: float = quantity("m", "along the line", 1.8, source="P", confidence="H", above=0)
+    width_y: float = quantity(
+        "m", "across the line, shaft", 1.8, source="P", confidence="H", above=0
+    )
+    cap_width_y: float = quantity(
+        "m", "across the line, cap", 3.0, source="P", confidence="H", above=0
+    )
+    elastic_modulus: float = quantity(
+        "Pa", "Young's modulus E", 3.0e10, source="P", confidence="H", above=0
+    )
+    poisson_ratio: float = quantity(
+        "", "Poisson's ratio ν", 0.2, source="P", confidence="H", minimum=0, below=0.5
+    )
+    density: float = quantity("kg/m^3", "density ρ", 2551, source="P", confidence="H", above=0)
+    shear_coefficient: float = quantity(
+        "", "shear coefficient κ of a rectangle, 5/6", 5 / 6, source="D", confidence="H", above=0
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Pier:
+        if not self.cap_height < self.height:
+            raise ValueError(
+                f"cap_height must be less than height = {self.height:g} m, got {self.cap_height:g} m"
+            )
+        return self
+
+
+class Guideway(Parameters):
+    """Simply supported spans in a row on shared piers."""
+
+    n_spans: int = Field(
+        5,
+        description="number of spans",
+        ge=1,
+        json_schema_extra={"unit": "", "source": "P", "confidence": "H"},
+    )
+    span_length: float = quantity("m", "pier to pier", 24.768, source="P", confidence="H", above=0)
+    girder: BeamSection = BeamSection()
+    rail: Rail = Rail()
+    bearing: Bearing = Bearing()
+    pier: Pier = Pier()
+    damping_ratio: float = quantity(
+        "",
+        "share of critical damping in every retained mode",
+        0.025,
+        source="M",
+        confidence="M",
+        minimum=0,
+        below=1,
+    )
+    refinement: int = Field(
+        1,
+        description="beam elements between neighbouring nodes of girder, rail and pier",
+        ge=1,
+        json_schema_extra={"unit": "", "source": "D", "confidence": "H"},
+    )
+
+    @property
+    def length(self) -> float:
+        """Length from the first pier to the last [m]."""
+        return self.n_spans * self.span_length
+
+
+class PowerLaw(Parameters):
+    """S(n) = coefficient · n^(-exponent), one-sided, n = 1/λ in 1/m, S in m³."""
+
+    law: Literal["power"] = "power"
+    coefficient: float = Field(
+        2.3e-8,
+        description="S at n = 1/m [SI: m³ (1/m)^exponent]",
+        gt=0,
+        json_schema_extra={"unit": "", "source": "M", "confidence": "L"},
+    )
+    exponent: float = Field(
+        1.5,
+        description="exponent [-]",
+        ge=0,
+        json_schema_extra={"unit": "", "source": "M", "confidence": "L"},
+    )
+
+
+class RationalLaw(Parameters):
+    """S(n) = Σ a_j n^j / Σ b_j n^j, one-sided, coefficients in rising order, S in m³ for n in 1/m."""
+
+    law: Literal["rational"]
+    numerator: tuple[float, ...] = Field(description="a_j in rising order [SI]", min_length=1)
+    denominator: tuple[float, ...] = Field(description="b_j in rising order [SI]", min_length=1)
+
+
+class GermanLaw(Parameters):
+    """German railway spectrum S(Ω) = A Ω_c² / ((Ω² + Ω_r²)(Ω² + Ω_c²)), Ω = 2πn; S(n) = 2π S(Ω)."""
+
+    law: Literal["german"]
+    roughness: float = quantity("m^2 rad/m", "A", 4.032e-7, source="A", confidence="M", above=0)
+    corner_c: float = quantity("rad/m", "Ω_c", 0.8246, source="A", confidence="M", above=0)
+    corner_r: float = quantity("rad/m", "Ω_r", 0.0206, source="A", confidence="M", above=0)
+
+
+Spectrum = PowerLaw | RationalLaw | GermanLaw
+
+
+class Irregularity(Parameters):
+    """Track irregularity: spectra in both directions, or a measured profile."""
+
+    enabled: bool = Field(True, description="false: a perfectly smooth track")
+    vertical: Spectrum = Field(
+        PowerLaw(), discriminator="law", description="one-sided spectrum of the vertical profile"
+    )
+    lateral: Spectrum = Field(
+        PowerLaw(coefficient=3.2e-8, exponent=1.6),
+        discriminator="law",
+        description="one-sided spectrum of the lateral profile",
+    )
+    wavelength_min: float = quantity(
+        "m", "shortest wavelength", 1, source="M", confidence="M", above=0
+    )
+    wavelength_max: float = quantity(
+        "m", "longest wavelength", 100, source="M", confidence="M", above=0
+    )
+    n_harmonics: int = Field(
+        1000,
+        description="cosines in the sum",
+        ge=1,
+        json_schema_extra={"unit": "", "source": "A", "confidence": "H"},
+    )
+    fade_in: float = quantity(
+        "m",
+        "length before the guideway over which the irregularity grows from nothing",
+        50,
+        source="A",
+        confidence="L",
+        above=0,
+    )
+    sides: Literal["shared", "independent"] = Field(
+        "shared", description="whether left and right rail share one profile"
+    )
+    profile_file: str | None = Field(
+        None,
+        description="measured profile (CSV or NetCDF with x, vertical, lateral [m]) instead of the spectra; path relative to the configuration file",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Irregularity:
+        if not self.wavelength_min < self.wavelength_max:
+            raise ValueError(
+                f"wavelength_min must be less than wavelength_max = {self.wavelength_max:g} m, got {self.wavelength_min:g} m"
+            )
+        return self
+
+
+class Gains(Parameters):
+    """Mean proportional and derivative gains of the PD controllers."""
+
+    suspension_proportional: float = quantity(
+        "A/m", "suspension k_p, mean", 3500, source="D, S1", confidence="M", above=0
+    )
+    suspension_derivative: float = quantity(
+        "A s/m", "suspension k_d, mean", 17.5, source="D, S1", confidence="M", minimum=0
+    )
+    guidance_proportional: float = quantity(
+        "A/m", "guidance k_p, mean", 4500, source="D, S1", confidence="M", above=0
+    )
+    guidance_derivative: float = quantity(
+        "A s/m", "guidance k_d, mean", 17.5, source="D, S1", confidence="M", minimum=0
+    )
+
+    @property
+    def as_row(self) -> tuple[float, float, float, float]:
+        """The four gains in the order of the ``gain`` dimension."""
+        return (
+            self.suspension_proportional,
+            self.suspension_derivative,
+            self.guidance_proportional,
+            self.guidance_derivative,
+        )
+
+
+class Passage(Parameters):
+    """One passage of the train over the guideway and how it is computed."""
+
+    speed: float = quantity(
+        "m/s", "constant speed of the train, v", "430 km/h", source="P", confidence="H", above=0
+    )
+    approach: float = quantity(
+        "m",
+        "rigid track before the first pier, at the start of the run",
+        150,
+        source="A",
+        confidence="H",
+        above=0,
+    )
+    time_step: float = quantity("s", "Δt", "0.25 ms", source="D", confidence="M", above=0)
+    mode_cutoff: float = quantity(
+        "Hz",
+        "highest guideway component mode that the production solver keeps",
+        500,
+        source="D",
+        confidence="M",
+        above=0,
+    )
+    acceleration_band: float | None = quantity(
+        "Hz",
+        "corner of the second-order Butterworth low-pass on guideway accelerations; null: raw",
+        100,
+        source="A",
+        confidence="M",
+        above=0,
+        optional=True,
+    )
+    gap_contact: float = quantity(
+        "m", "gap at which magnet and rail touch", "0.5 mm", source="A", confidence="M", above=0
+    )
+    gap_lost: float = quantity(
+        "m", "gap beyond which levitation is lost", "40 mm", source="A", confidence="M", above=0
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Passage:
+        if not self.gap_contact < self.gap_lost:
+            raise ValueError(
+                f"gap_contact must be less than gap_lost = {self.gap_lost:g} m, got {self.gap_contact:g} m"
+            )
+        return self
+
+
+class Validation(Parameters):
+    """The sweep of speeds behind the dynamic coefficient and the measurements beside it."""
+
+    speed_min: float = quantity(
+        "m/s", "slowest passage", "50 km/h", source="P", confidence="H", above=0
+    )
+    speed_max: float = quantity(
+        "m/s", "fastest passage", "430 km/h", source="P", confidence="H", above=0
+    )
+    speed_step: float = quantity(
+        "m/s", "between neighbouring speeds", "10 km/h", source="P", confidence="H", above=0
+    )
+    measurements: str = Field(
+        "measurements/shanghai.yaml",
+        description="measured values; path relative to the configuration file",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Validation:
+        if not self.speed_min <= self.speed_max:
+            raise ValueError("speed_min must not exceed speed_max")
+        return self
+
+
+class Config(Parameters):
+    """Everything a run is made of."""
+
+    run: str = Field(
+        "paper",
+        description="name of the run: its results lie in results/<run>",
+        pattern=r"^[A-Za-z0-9_-]+$",
+    )
+    demonstration: bool = Field(
+        False, description="mark all files and figures as a demonstration, not a result"
+    )
+    seed: int = Field(20240919, description="seed of everything random", ge=0)
+    train: Train = Train()
+    guideway: Guideway = Guideway()
+    irregularity: Irregularity = Irregularity()
+    gains: Gains = Gains()
+    passage: Passage = Passage()
+    validation: Validation = Validation()
+
+    @model_validator(mode="after")
+    def _check(self) -> Config:
+        for kind in ("suspension", "guidance"):
+            magnet = getattr(self.train, f"{kind}_magnet")
+            if not self.passage.gap_contact < magnet.gap_reference < self.passage.gap_lost:
+                raise ValueError(
+                    f"train.{kind}_magnet.gap_reference must lie between passage.gap_contact = "
+                    f"{self.passage.gap_contact:g} m and passage.gap_lost = {self.passage.gap_lost:g} m, "
+                    f"got {magnet.gap_reference:g} m"
+                )
+        if self.irregularity.fade_in > self.passage.approach:
+            raise ValueError(
+                f"irregularity.fade_in must not exceed passage.approach = {self.passage.approach:g} m, "
+                f"got {self.irregularity.fade_in:g} m"
+            )
+        return self
