@@ -1,0 +1,319 @@
+"""Kriging: Gaussian processes with a Matérn 5/2 covariance and one length per input.
+
+scikit-learn supplies the covariance, its likelihood and the factorisation; gradient,
+leave-one-out, covariance and the fast sums, which it lacks, are formulas on what it found.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_solve, solve_triangular
+from scipy.optimize import minimize
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import ConstantKernel, Matern
+
+from maglev.uncertainty import _radial_kernels as kernels
+from maglev.uncertainty.surrogate import Array, checked_points, checked_training
+
+NUGGET = 1e-10
+"""Variance added to the diagonal, over the variance of the response [-]: the default of
+scikit-learn, which keeps the factorisation possible and is far below any error of interest."""
+
+LENGTH_RANGE = (0.1, 1e3)
+"""Lengths that are tried, in standard deviations of the input [-]; assumed."""
+
+AMPLITUDE_RANGE = (1e-3, 1e5)
+"""Prior variances that are tried, over the variance of the response [-]; assumed."""
+
+STARTS = (1.0, 3.0, 10.0)
+"""Equal lengths from the likeliest of which the search starts [-]; assumed."""
+
+BLOCK = 4096
+"""Points per block where a matrix (point, sample) is needed; bounds the memory; assumed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kriging:
+    """Fitted Gaussian processes, one per response, on common training points.
+
+    Parameters
+    ----------
+    points : (sample, parameter)
+        Standardised training points [-].
+    values : (sample, response)
+        Training values [unit of the response].
+    mean, deviation : (response,)
+        Mean and standard deviation of the training values [unit of the response]; the process has
+        this constant mean.
+    length : (response, parameter)
+        Length of each input [-], in its standard deviations.
+    amplitude : (response,)
+        Prior variance over the squared deviation [-].
+    weights : (sample, response)
+        K⁻¹ (y − mean)/deviation [-].
+    factor : (response, sample, sample)
+        Lower Cholesky factor of K [-].
+    """
+
+    points: Array
+    values: Array
+    mean: Array
+    deviation: Array
+    length: Array
+    amplitude: Array
+    weights: Array
+    factor: Array
+
+    def predict(self, points: npt.ArrayLike) -> Array:
+        """Posterior mean.
+
+        Parameters
+        ----------
+        points : (point, parameter)
+            Standardised points [-].
+
+        Returns
+        -------
+        values : (point, response)
+            Predictions [unit of the response].
+
+        Raises
+        ------
+        ValueError
+            If ``points`` are not finite or have another number of parameters.
+        """
+        points = checked_points(points, self.points.shape[1])
+        values = np.empty((points.shape[0], self.mean.size))
+        for response, length in enumerate(self.length):
+            total = np.zeros((points.shape[0], 1))
+            kernels.radial_sum(
+                kernels.MATERN,
+                1.0,
+                self.points / length,
+                self.weights[:, response, None] * self.amplitude[response],
+                points / length,
+                total,
+            )
+            values[:, response] = total[:, 0]
+        return self.mean + self.deviation * values
+
+    def gradient(self, points: npt.ArrayLike) -> Array:
+        """Gradient of the posterior mean in closed form.
+
+        Parameters
+        ----------
+        points : (point, parameter)
+            Standardised points [-].
+
+        Returns
+        -------
+        gradient : (point, response, parameter)
+            Slope with respect to each standardised input [unit of the response].
+
+        Raises
+        ------
+        ValueError
+            If ``points`` are not finite or have another number of parameters.
+        """
+        points = checked_points(points, self.points.shape[1])
+        gradient = np.empty((points.shape[0], self.mean.size, points.shape[1]))
+        for response, length in enumerate(self.length):
+            total = np.zeros((points.shape[0], 1, points.shape[1]))
+            kernels.radial_sum_gradient(
+                kernels.MATERN,
+                1.0,
+                self.points / length,
+                self.weights[:, response, None] * self.amplitude[response],
+                points / length,
+                total,
+            )
+            gradient[:, response] = self.deviation[response] * total[:, 0] / length
+        return gradient
+
+    def leave_one_out(self) -> Array:
+        """Residual at each training point of the fit made without it, all parameters kept.
+
+        e_k = α_k / (K⁻¹)_kk; mean, deviation, lengths and amplitude stay as they are.
+
+        Returns
+        -------
+        residuals : (sample, response)
+            Value less prediction [unit of the response].
+
+        References
+        ----------
+        Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), eq. 5.12.
+        """
+        return self.deviation * self.weights / self._inverse_diagonal()
+
+    def leave_one_out_deviation(self) -> Array:
+        """Standard deviation that goes with each leave-one-out residual.
+
+        Returns
+        -------
+        deviation : (sample, response)
+            1/√(K⁻¹)_kk [unit of the response].
+
+        References
+        ----------
+        Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), eq. 5.12.
+        """
+        return self.deviation / np.sqrt(self._inverse_diagonal())
+
+    def standard_deviation(self, points: npt.ArrayLike) -> Array:
+        """Posterior standard deviation; a variance that rounding makes negative counts as zero.
+
+        Parameters
+        ----------
+        points : (point, parameter)
+            Standardised points [-].
+
+        Returns
+        -------
+        deviation : (point, response)
+            Standard deviation [unit of the response].
+
+        Raises
+        ------
+        ValueError
+            If ``points`` are not finite or have another number of parameters.
+        """
+        points = checked_points(points, self.points.shape[1])
+        variance = np.empty((points.shape[0], self.mean.size))
+        for start in range(0, points.shape[0], BLOCK):
+            block = points[start : start + BLOCK]
+            for response in range(self.mean.size):
+                known = self._whitened(response, block)
+                explained = np.einsum("ij,ij->j", known, known)
+                variance[start : start + BLOCK, response] = self.amplitude[response] - explained
+        return self.deviation * np.sqrt(np.maximum(variance, 0.0))
+
+    def covariance(self, response: int, rows: npt.ArrayLike, columns: npt.ArrayLike) -> Array:
+        """Posterior covariance of one response between two sets of points.
+
+        Parameters
+        ----------
+        response
+            Which response.
+        rows : (row, parameter)
+            Standardised points [-].
+        columns : (column, parameter)
+            Standardised points [-].
+
+        Returns
+        -------
+        covariance : (row, column)
+            Covariance [unit of the response squared].
+
+        Raises
+        ------
+        ValueError
+            If points are not finite or have another number of parameters.
+        """
+        rows = checked_points(rows, self.points.shape[1])
+        columns = checked_points(columns, self.points.shape[1])
+        prior = self._prior(response, rows, columns)
+        explained = self._whitened(response, rows).T @ self._whitened(response, columns)
+        return self.deviation[response] ** 2 * (prior - explained)
+
+    def _prior(self, response: int, rows: Array, columns: Array) -> Array:
+        """Prior covariance (row, column) of the standardised response."""
+        length = self.length[response]
+        matrix = np.empty((rows.shape[0], columns.shape[0]))
+        kernels.radial_matrix(kernels.MATERN, 1.0, rows / length, columns / length, matrix)
+        return self.amplitude[response] * matrix
+
+    def _whitened(self, response: int, points: Array) -> Array:
+        """L⁻¹ k (sample, point), whose squares sum to the explained variance."""
+        prior = self._prior(response, self.points, points)
+        return solve_triangular(self.factor[response], prior, lower=True, overwrite_b=True)
+
+    def _inverse_diagonal(self) -> Array:
+        """(K⁻¹)_kk (sample, response)."""
+        identity = np.eye(self.points.shape[0])
+        return np.column_stack(
+            [np.diag(cho_solve((factor, True), identity)) for factor in self.factor]
+        )
+
+
+def fit_kriging(points: npt.ArrayLike, values: npt.ArrayLike) -> Kriging:
+    """Find lengths and prior variance of each response by maximum likelihood.
+
+    Every response has a Gaussian process of its own: constant mean, Matérn 5/2 covariance, one
+    length per input.  The search starts from the likeliest of ``STARTS``, hence from nothing but
+    the data: the same data give the same surrogate.
+
+    Parameters
+    ----------
+    points : (sample, parameter)
+        Standardised training points [-].
+    values : (sample, response) or (sample,)
+        Training values [unit of the response].
+
+    Returns
+    -------
+    surrogate
+        The fitted surrogate.
+
+    Raises
+    ------
+    ValueError
+        If the training data cannot be used (``checked_training``), or points lie so close that
+        the covariance matrix cannot be factorised.
+
+    References
+    ----------
+    Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), ch. 2, 4.2 and 5.4.1.
+    """
+    points, values = checked_training(points, values)
+    n, s = points.shape
+    mean, deviation = values.mean(axis=0), values.std(axis=0)
+    n_responses = mean.size
+    length, amplitude = np.empty((n_responses, s)), np.empty(n_responses)
+    weights, factor = np.empty((n, n_responses)), np.empty((n_responses, n, n))
+    for response in range(n_responses):
+        standardised = (values[:, response] - mean[response]) / deviation[response]
+        theta = _likeliest(points, standardised)
+        amplitude[response], length[response] = np.exp(theta[0]), np.exp(theta[1:])
+        process = _process(amplitude[response], length[response])
+        try:
+            process.fit(points, standardised)
+        except np.linalg.LinAlgError as error:
+            raise ValueError(
+                f"covariance matrix of response {response} must be positive definite, got one "
+                "that cannot be factorised; remove points that nearly coincide"
+            ) from error
+        weights[:, response], factor[response] = process.alpha_, process.L_
+    return Kriging(
+        points=points,
+        values=values,
+        mean=mean,
+        deviation=deviation,
+        length=length,
+        amplitude=amplitude,
+        weights=weights,
+        factor=factor,
+    )
+
+
+def _process(amplitude: float, length: Array) -> GaussianProcessRegressor:
+    """A Gaussian process with given parameters, not fitted."""
+    kernel = ConstantKernel(amplitude, AMPLITUDE_RANGE) * Matern(length, LENGTH_RANGE, nu=2.5)
+    return GaussianProcessRegressor(kernel=kernel, alpha=NUGGET, optimizer=None)
+
+
+def _likeliest(points: Array, standardised: Array) -> Array:
+    """Logarithms of amplitude and lengths (1 + parameter,) that maximise the likelihood."""
+    process = _process(1.0, np.ones(points.shape[1])).fit(points, standardised)
+
+    def unlikeliness(theta: Array) -> tuple[float, Array]:
+        likelihood, gradient = process.log_marginal_likelihood(
+            theta, eval_gradient=True, clone_kernel=False
+        )
+        return -likelihood, -gradient
+
+    starts = [np.log([1.0] + [length] * points.shape[1]) for length in STARTS]
+    start = min(starts, key=lambda theta: unlikeliness(theta)[0])
+    bounds = process.kernel_.bounds
+    return minimize(unlikeliness, start, jac=True, method="L-BFGS-B", bounds=bounds).x

@@ -1,0 +1,207 @@
+"""What every surrogate offers, what it asks of its training data, and which one serves best.
+
+All surrogates live in standardised inputs u = (θ − μ)/σ and carry several responses at once.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class Surrogate(Protocol):
+    """A fitted surrogate of several responses."""
+
+    @property
+    def points(self) -> Array:
+        """Training points (sample, parameter) [-], standardised."""
+
+    @property
+    def values(self) -> Array:
+        """Training values (sample, response) [unit of the response]."""
+
+    def predict(self, points: npt.ArrayLike) -> Array:
+        """Values (point, response) at ``points`` (point, parameter)."""
+
+    def gradient(self, points: npt.ArrayLike) -> Array:
+        """Gradients (point, response, parameter) at ``points`` (point, parameter)."""
+
+    def leave_one_out(self) -> Array:
+        """Residuals (sample, response): value less the prediction made without that sample."""
+
+
+class SurrogateWithDeviation(Surrogate, Protocol):
+    """A surrogate that knows how uncertain it is."""
+
+    def standard_deviation(self, points: npt.ArrayLike) -> Array:
+        """Standard deviations (point, response) at ``points`` (point, parameter)."""
+
+    def covariance(self, response: int, rows: npt.ArrayLike, columns: npt.ArrayLike) -> Array:
+        """Covariance (row, column) of one response between two sets of points."""
+
+
+Fit = Callable[[Array, Array], Surrogate]
+
+
+def checked_points(points: npt.ArrayLike, n_parameters: int | None = None) -> Array:
+    """Points as a contiguous array of floats, after a look at their shape and their values.
+
+    Parameters
+    ----------
+    points : (point, parameter)
+        Standardised points [-].
+    n_parameters
+        How many parameters they must have; any number if not given.
+
+    Returns
+    -------
+    points : (point, parameter)
+        The same points.
+
+    Raises
+    ------
+    ValueError
+        If the shape is another one or a coordinate is not finite.
+    """
+    array = np.ascontiguousarray(points, dtype=np.float64)
+    expected = "any" if n_parameters is None else n_parameters
+    if array.ndim != 2 or (n_parameters is not None and array.shape[1] != n_parameters):
+        raise ValueError(
+            f"points have shape {array.shape}, expected (point, parameter) = (any, {expected}); "
+            "give one row per point"
+        )
+    unusable = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if unusable.size:
+        raise ValueError(
+            f"points must be finite, got {unusable.size} of {array.shape[0]} that are not; "
+            f"first is point {unusable[0]}: leave them out or correct them"
+        )
+    return array
+
+
+def checked_training(points: npt.ArrayLike, values: npt.ArrayLike) -> tuple[Array, Array]:
+    """Training data as arrays, after a look at everything a surrogate cannot do without.
+
+    Parameters
+    ----------
+    points : (sample, parameter)
+        Standardised training points [-].
+    values : (sample, response) or (sample,)
+        Their responses [unit of the response].
+
+    Returns
+    -------
+    points : (sample, parameter)
+        The same points.
+    values : (sample, response)
+        The same values.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, something is not finite, two points coincide, a response is constant,
+        or there are fewer points than a linear tail needs.
+    """
+    points = checked_points(points)
+    values = np.array(values, dtype=np.float64)
+    if values.ndim == 1:
+        values = values[:, None]
+    n, s = points.shape
+    if values.ndim != 2 or values.shape[0] != n or values.shape[1] == 0:
+        raise ValueError(
+            f"values have shape {values.shape}, expected (sample, response) = ({n}, at least 1); "
+            "give one row per training point"
+        )
+    unusable = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if unusable.size:
+        raise ValueError(
+            f"training values must be finite, got {unusable.size} of {n} samples that are not; "
+            f"first is sample {unusable[0]}: a lost sample never enters a regression, leave it out"
+        )
+    if n < s + 1:
+        raise ValueError(
+            f"a linear tail in {s} parameters needs at least {s + 1} points, got {n}; "
+            "add training points"
+        )
+    order = np.lexsort(points.T)
+    same = np.flatnonzero((np.diff(points[order], axis=0) == 0.0).all(axis=1))
+    if same.size:
+        first, second = sorted(order[same[0] : same[0] + 2])
+        raise ValueError(
+            f"training points must be distinct, got the same point as samples {first} and "
+            f"{second}; leave one of them out"
+        )
+    rank = np.linalg.matrix_rank(np.column_stack([np.ones(n), points]))
+    if rank < s + 1:
+        raise ValueError(
+            f"training points must span all {s} parameters, got points that span only "
+            f"{rank - 1}; add points off that plane or drop the parameter that does not vary"
+        )
+    constant = np.flatnonzero(np.ptp(values, axis=0) == 0.0)
+    if constant.size:
+        raise ValueError(
+            f"every response must vary, got {values[0, constant[0]]} at all {n} points for "
+            f"response {constant[0]}; leave it out of the surrogate"
+        )
+    return points, values
+
+
+def relative_error(surrogate: Surrogate) -> Array:
+    """Root mean square of the leave-one-out residuals over the deviation of the response.
+
+    Parameters
+    ----------
+    surrogate
+        A fitted surrogate.
+
+    Returns
+    -------
+    error : (response,)
+        Relative error [-]: 0 exact, 1 no better than the mean.
+
+    Raises
+    ------
+    ValueError
+        If there are too few points to leave one out.
+    """
+    residuals = surrogate.leave_one_out()
+    return np.sqrt(np.mean(residuals**2, axis=0)) / np.std(surrogate.values, axis=0)
+
+
+def best_by_leave_one_out(surrogates: Mapping[str, Surrogate]) -> tuple[str, ...]:
+    """Name of the surrogate with the smallest leave-one-out error, for each response.
+
+    Parameters
+    ----------
+    surrogates
+        Named surrogates of the same training data.
+
+    Returns
+    -------
+    names : (response,)
+        The best name for each response; the first one named wins a tie.
+
+    Raises
+    ------
+    ValueError
+        If there is nothing to choose from or the training data differ.
+    """
+    names = list(surrogates)
+    if not names:
+        raise ValueError("choosing a surrogate needs at least one, got none; name one")
+    first = surrogates[names[0]]
+    for name in names[1:]:
+        other = surrogates[name]
+        if not (
+            np.array_equal(first.points, other.points)
+            and np.array_equal(first.values, other.values)
+        ):
+            raise ValueError(
+                f"surrogates '{names[0]}' and '{name}' must share their training data, got "
+                "different ones; fit them on the same samples"
+            )
+    errors = np.array([relative_error(surrogates[name]) for name in names])
+    return tuple(names[index] for index in np.argmin(errors, axis=0))
