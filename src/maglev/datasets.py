@@ -1,0 +1,579 @@
+"""What each file holds: dimensions, units and meaning of every variable; describe, check, write.
+
+One table names every variable of every file once (`VARIABLES`); one table says which file holds
+which (`LAYOUTS`).  Files follow the CF conventions, appear whole or not at all, and two writes of
+equal data give equal bytes: no time of writing stands inside.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+CONVENTIONS = "CF-1.11"
+REFERENCES = (
+    "Dynamic reliability of a high-speed EMS maglev train on a guideway bridge by an adaptive "
+    "surrogate model and probability density evolution, J. Low Freq. Noise Vib. Act. Control "
+    "(2024), doi 10.1177/14613484241279033"
+)
+AXES = "x along travel from the first pier, y to the right, z down; SI units"
+
+RESPONSES = (
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+    "car_body_acceleration_z",
+    "car_body_acceleration_y",
+)
+"""The six responses whose extremes a passage is judged by."""
+
+GAINS = (
+    "suspension_proportional_gain",
+    "suspension_derivative_gain",
+    "guidance_proportional_gain",
+    "guidance_derivative_gain",
+)
+"""The four gains, in the order of the columns of the array that `simulate` takes."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variable:
+    """One variable of a file: where it lives, in which unit, and what it means.
+
+    Parameters
+    ----------
+    dims
+        Names of its dimensions, in order.
+    units
+        Unit in the notation of UDUNITS; ``"1"`` for a pure number.
+    long_name
+        What it is, as an axis label would say it.
+    dtype
+        Type in the file.
+    flags
+        Meaning of each integer value, for a variable that is a code; empty for a number.
+    """
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    dtype: str = "float64"
+    flags: Mapping[int, str] | None = None
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """The attributes that stand with the variable in a file."""
+        if self.flags is None:
+            return {"units": self.units, "long_name": self.long_name}
+        return {
+            "long_name": self.long_name,
+            "flag_values": np.array(list(self.flags), dtype=self.dtype),
+            "flag_meanings": " ".join(self.flags.values()),
+        }
+
+
+STATUS = {0: "completed", 1: "contact", 2: "gap_lost", 3: "not_finite"}
+"""How a passage ended: levitated throughout, or why it stopped."""
+
+_GIRDER = "of the girder at midspan of the middle span"
+_CAR = "of the car body, largest over the cars"
+_QUANTITY = {
+    "girder_displacement_z": ("m", f"vertical displacement {_GIRDER}"),
+    "girder_displacement_y": ("m", f"lateral displacement {_GIRDER}"),
+    "girder_acceleration_z": ("m s-2", f"vertical acceleration {_GIRDER}"),
+    "girder_acceleration_y": ("m s-2", f"lateral acceleration {_GIRDER}"),
+    "car_body_acceleration_z": ("m s-2", f"vertical acceleration {_CAR}"),
+    "car_body_acceleration_y": ("m s-2", f"lateral acceleration {_CAR}"),
+}
+
+
+def _table() -> dict[str, Variable]:
+    table = {
+        "sample": Variable(
+            dims=("sample",), units="1", long_name="number of the passage", dtype="int64"
+        ),
+        "car": Variable(
+            dims=("car",), units="1", long_name="number of the car from the nose", dtype="int32"
+        ),
+        "magnet": Variable(
+            dims=("magnet",), units="1", long_name="number of the magnet", dtype="int32"
+        ),
+        "magnet_kind": Variable(
+            dims=("magnet",),
+            units="1",
+            long_name="kind of the magnet",
+            dtype="int8",
+            flags={0: "suspension", 1: "guidance"},
+        ),
+        "magnet_side": Variable(
+            dims=("magnet",),
+            units="1",
+            long_name="side of the magnet, looking along travel",
+            dtype="int8",
+            flags={-1: "left", 1: "right"},
+        ),
+        "magnet_x": Variable(
+            dims=("magnet",),
+            units="m",
+            long_name="centre of the magnet along travel, from the middle of the first car",
+        ),
+        "t": Variable(dims=("t",), units="s", long_name="time since the start of the passage"),
+        "x": Variable(
+            dims=("x",), units="m", long_name="distance along travel from the first pier"
+        ),
+        "side": Variable(
+            dims=("side",),
+            units="1",
+            long_name="side of the guideway, looking along travel",
+            dtype="int8",
+            flags={-1: "left", 1: "right"},
+        ),
+        "wavenumber": Variable(
+            dims=("wavenumber",), units="m-1", long_name="wavenumber, one over the wavelength"
+        ),
+        "mode": Variable(
+            dims=("mode",), units="1", long_name="number of the mode from the lowest", dtype="int32"
+        ),
+        "speed": Variable(dims=("speed",), units="m s-1", long_name="speed of the train"),
+        "measured_speed": Variable(
+            dims=("measured_speed",), units="m s-1", long_name="speed of the measured passage"
+        ),
+        "status": Variable(
+            dims=("sample",),
+            units="1",
+            long_name="how the passage ended",
+            dtype="int8",
+            flags=STATUS,
+        ),
+        "lost_t": Variable(
+            dims=("sample",), units="s", long_name="time at which levitation was lost"
+        ),
+        "lost_magnet": Variable(
+            dims=("sample",),
+            units="1",
+            long_name="number of the magnet that lost levitation, -1 for none",
+            dtype="int32",
+        ),
+    }
+    for name, unit in zip(GAINS, ("A m-1", "A s m-1") * 2, strict=True):
+        table[name] = Variable(
+            dims=("sample",), units=unit, long_name=f"{name.replace('_', ' ')} of the magnets"
+        )
+    for name, (unit, meaning) in _QUANTITY.items():
+        table[name] = Variable(
+            dims=("sample",), units=unit, long_name=f"largest absolute {meaning}"
+        )
+        table[f"{name}_t"] = Variable(
+            dims=("sample",), units="s", long_name=f"time of the largest absolute {meaning}"
+        )
+        of_car = name.startswith("car_body")
+        table[f"{name}_history"] = Variable(
+            dims=("sample", "car", "t") if of_car else ("sample", "t"),
+            units=unit,
+            long_name=meaning.replace(", largest over the cars", ""),
+            dtype="float32",
+        )
+        if of_car:
+            table[f"{name}_per_car"] = Variable(
+                dims=("sample", "car"),
+                units=unit,
+                long_name=f"largest absolute {meaning.replace(', largest over the cars', '')}",
+            )
+    for kind in ("suspension", "guidance"):
+        for end, word in (("min", "smallest"), ("max", "largest")):
+            table[f"{kind}_gap_{end}"] = Variable(
+                dims=("sample",), units="m", long_name=f"{word} gap of any {kind} pole"
+            )
+        table[f"{kind}_current_max"] = Variable(
+            dims=("sample",), units="A", long_name=f"largest current of any {kind} magnet"
+        )
+    table["gap_history"] = Variable(
+        dims=("sample", "magnet", "t"),
+        units="m",
+        long_name="mean gap of the magnet's poles",
+        dtype="float32",
+    )
+    table["current_history"] = Variable(
+        dims=("sample", "magnet", "t"),
+        units="A",
+        long_name="mean current of the magnet's poles",
+        dtype="float32",
+    )
+    for direction in ("vertical", "lateral"):
+        table[f"irregularity_{direction}"] = Variable(
+            dims=("side", "x"), units="m", long_name=f"{direction} irregularity of the rail"
+        )
+        table[f"spectrum_{direction}"] = Variable(
+            dims=("wavenumber",),
+            units="m3",
+            long_name=f"one-sided spectrum of the {direction} irregularity, estimated by Welch",
+        )
+        table[f"target_{direction}"] = Variable(
+            dims=("wavenumber",),
+            units="m3",
+            long_name=f"one-sided spectrum that the {direction} irregularity is drawn from",
+        )
+        table[f"deviation_{direction}"] = Variable(
+            dims=(), units="m", long_name=f"standard deviation of the {direction} irregularity"
+        )
+    table["frequency"] = Variable(
+        dims=("mode",), units="Hz", long_name="natural frequency of the guideway"
+    )
+    table["direction"] = Variable(
+        dims=("mode",),
+        units="1",
+        long_name="direction in which the girders move most",
+        dtype="int8",
+        flags={0: "longitudinal", 1: "lateral", 2: "vertical", 3: "torsion"},
+    )
+    for axis, word in (("x", "longitudinal"), ("y", "lateral"), ("z", "vertical")):
+        table[f"girder_shape_{axis}"] = Variable(
+            dims=("mode", "x"),
+            units="1",
+            long_name=f"{word} part of the mode along the girder axes, largest part of a mode 1",
+        )
+    table["girder_shape_roll"] = Variable(
+        dims=("mode", "x"),
+        units="m-1",
+        long_name="roll of the girders in the mode, rad per unit of the largest displacement",
+    )
+    table["frequency_simply_supported"] = Variable(
+        dims=(),
+        units="Hz",
+        long_name="first vertical frequency of one span as a simply supported Euler beam",
+    )
+    table["measured_frequency"] = Variable(
+        dims=(), units="Hz", long_name="first vertical frequency measured on the line"
+    )
+    table["deflection"] = Variable(
+        dims=("t",),
+        units="m",
+        long_name="vertical deflection at midspan of the middle span under the train",
+    )
+    table["deflection_moving_load"] = Variable(
+        dims=("t",),
+        units="m",
+        long_name="vertical deflection at midspan under a moving uniform load, closed form",
+    )
+    table["static_deflection"] = Variable(
+        dims=(),
+        units="m",
+        long_name="largest vertical deflection at midspan of the middle span under the train at rest",
+    )
+    table["static_deflection_moving_load"] = Variable(
+        dims=(),
+        units="m",
+        long_name="vertical deflection at midspan of a simply supported beam under the uniform load",
+    )
+    table["passage_speed"] = Variable(dims=(), units="m s-1", long_name="speed of the train")
+    table["peak_deflection"] = Variable(
+        dims=("speed",),
+        units="m",
+        long_name="largest vertical deflection at midspan of the middle span",
+    )
+    table["dynamic_factor"] = Variable(
+        dims=("speed",),
+        units="1",
+        long_name="dynamic coefficient, largest deflection over static deflection",
+    )
+    table["dynamic_factor_moving_load"] = Variable(
+        dims=("speed",),
+        units="1",
+        long_name="dynamic coefficient of a simply supported beam under a moving uniform load",
+    )
+    table["passage_status"] = Variable(
+        dims=("speed",),
+        units="1",
+        long_name="how the passage ended",
+        dtype="int8",
+        flags=STATUS,
+    )
+    table["measured_deflection"] = Variable(
+        dims=("measured_speed",),
+        units="m",
+        long_name="largest vertical deflection at midspan measured on the line",
+    )
+    return table
+
+
+VARIABLES: Mapping[str, Variable] = _table()
+"""Every variable and coordinate of every file, by name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """One kind of file: its title, and the variables it must and may hold."""
+
+    title: str
+    variables: tuple[str, ...]
+    optional: tuple[str, ...] = ()
+
+
+_EXTREMES = (
+    *GAINS,
+    *RESPONSES,
+    *(f"{name}_t" for name in RESPONSES),
+    "car_body_acceleration_z_per_car",
+    "car_body_acceleration_y_per_car",
+    "suspension_gap_min",
+    "suspension_gap_max",
+    "guidance_gap_min",
+    "guidance_gap_max",
+    "suspension_current_max",
+    "guidance_current_max",
+    "status",
+    "lost_t",
+    "lost_magnet",
+)
+_HISTORIES = (
+    *(f"{name}_history" for name in RESPONSES),
+    "gap_history",
+    "current_history",
+    "magnet_kind",
+    "magnet_side",
+    "magnet_x",
+)
+
+LAYOUTS: Mapping[str, Layout] = {
+    "passage": Layout(
+        title="Passage of the train over the guideway",
+        variables=_EXTREMES,
+        optional=_HISTORIES,
+    ),
+    "irregularity": Layout(
+        title="Track irregularity and its spectra",
+        variables=tuple(
+            f"{what}_{direction}"
+            for what in ("irregularity", "spectrum", "target", "deviation")
+            for direction in ("vertical", "lateral")
+        ),
+    ),
+    "modes": Layout(
+        title="Natural modes of the guideway",
+        variables=(
+            "frequency",
+            "direction",
+            "girder_shape_x",
+            "girder_shape_y",
+            "girder_shape_z",
+            "girder_shape_roll",
+            "frequency_simply_supported",
+            "measured_frequency",
+        ),
+    ),
+    "deflection": Layout(
+        title="Midspan deflection under the passing train",
+        variables=(
+            "deflection",
+            "deflection_moving_load",
+            "static_deflection_moving_load",
+            "passage_speed",
+        ),
+    ),
+    "dynamic_factor": Layout(
+        title="Dynamic coefficient of the midspan deflection against speed",
+        variables=(
+            "peak_deflection",
+            "dynamic_factor",
+            "dynamic_factor_moving_load",
+            "static_deflection",
+            "static_deflection_moving_load",
+            "passage_status",
+            "measured_deflection",
+        ),
+    ),
+}
+"""What each kind of file holds, by the name of the stage that writes it."""
+
+
+def describe(dataset: xr.Dataset) -> xr.Dataset:
+    """Give every variable its unit and meaning from `VARIABLES`; arrays are not copied.
+
+    Raises
+    ------
+    ValueError
+        If a variable is not in `VARIABLES` or stands on other dimensions than written there.
+    """
+    described = dataset.copy(deep=False)
+    for name in described.variables:
+        variable = VARIABLES.get(str(name))
+        if variable is None:
+            raise ValueError(f"'{name}' is no variable of any file, see maglev.datasets.VARIABLES")
+        if described[name].dims != variable.dims:
+            raise ValueError(
+                f"'{name}' must stand on {variable.dims}, got {tuple(described[name].dims)}"
+            )
+        described[name].attrs = {**described[name].attrs, **variable.attributes}
+    return described
+
+
+def check(dataset: xr.Dataset, layout: str) -> None:
+    """Refuse a dataset that is not what its layout says.
+
+    Parameters
+    ----------
+    dataset
+        As computed or as read from a file.
+    layout
+        A key of `LAYOUTS`.
+
+    Raises
+    ------
+    ValueError
+        If a variable is missing or unexpected, or has another unit or other dimensions than
+        `VARIABLES` says.
+    """
+    known = LAYOUTS[layout]
+    for name in known.variables:
+        if name not in dataset.variables:
+            raise ValueError(f"{layout}: '{name}' is missing")
+    for name in map(str, dataset.variables):
+        if name in dataset.dims:
+            continue
+        if name not in (*known.variables, *known.optional):
+            raise ValueError(f"{layout}: '{name}' does not belong here")
+        expected, found = VARIABLES[name], dataset[name]
+        if tuple(found.dims) != expected.dims:
+            raise ValueError(
+                f"{layout}: '{name}' must stand on {expected.dims}, got {tuple(found.dims)}"
+            )
+        if expected.flags is None and found.attrs.get("units") != expected.units:
+            raise ValueError(
+                f"{layout}: '{name}' must be in '{expected.units}', "
+                f"got '{found.attrs.get('units')}'"
+            )
+
+
+def file_hash(path: str | Path) -> str:
+    """SHA-256 of a file's bytes, in hexadecimal."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def provenance(
+    layout: str,
+    *,
+    config: Mapping[str, Any],
+    code: str,
+    inputs: Mapping[str, str | Path] | None = None,
+) -> dict[str, str | int]:
+    """Return the global attributes that make a file explain itself.
+
+    Parameters
+    ----------
+    layout
+        A key of `LAYOUTS`.
+    config
+        The part of the configuration that decides the content, units included; its ``seed``
+        and ``demonstration`` are also given on their own.
+    code
+        Fingerprint of the code that computed it.
+    inputs
+        Files read, by the role they play.
+    """
+    from maglev import __version__
+
+    attributes: dict[str, str | int] = {
+        "Conventions": CONVENTIONS,
+        "title": LAYOUTS[layout].title,
+        "source": f"maglev {__version__}",
+        "references": REFERENCES,
+        "axes": AXES,
+        "layout": layout,
+        "config": json.dumps(config, sort_keys=True, ensure_ascii=False),
+        "code": code,
+        "demonstration": "yes" if config.get("demonstration") else "no",
+    }
+    if "seed" in config:
+        attributes["seed"] = int(config["seed"])
+    for role, path in sorted((inputs or {}).items()):
+        attributes[f"input_{role}"] = f"sha256:{file_hash(path)}"
+    if config.get("demonstration"):
+        attributes["title"] = f"{attributes['title']} (demonstration, not a result)"
+    return attributes
+
+
+def write(
+    dataset: xr.Dataset,
+    path: str | Path,
+    layout: str,
+    *,
+    config: Mapping[str, Any],
+    code: str,
+    inputs: Mapping[str, str | Path] | None = None,
+) -> None:
+    """Describe, check and write a dataset: the file appears whole or not at all.
+
+    The parameters beside ``dataset`` and ``path`` are those of `provenance`.
+
+    Raises
+    ------
+    ValueError
+        As `describe` and `check` do.
+    """
+    described = describe(dataset)
+    check(described, layout)
+    attributes = provenance(layout, config=config, code=code, inputs=inputs)
+    described.attrs = {**dataset.attrs, **attributes}
+    write_netcdf(described, path)
+
+
+def write_netcdf(dataset: xr.Dataset, path: str | Path) -> None:
+    """Write a described dataset aside and rename it into place, byte for byte reproducibly.
+
+    Variables are compressed (zlib 4, shuffled) in the type that `VARIABLES` names; attributes are
+    written in alphabetical order.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    ordered = dataset.copy(deep=False)
+    ordered.attrs = dict(sorted(dataset.attrs.items()))
+    encoding: dict[str, dict[str, Any]] = {}
+    for name in map(str, ordered.variables):
+        dtype = VARIABLES[name].dtype
+        encoding[name] = {"dtype": dtype, "_FillValue": None}
+        if ordered[name].ndim:
+            encoding[name] |= {"zlib": True, "complevel": 4, "shuffle": True}
+        ordered[name].encoding = {}
+    handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
+    os.close(handle)
+    try:
+        ordered.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
+        os.chmod(aside, 0o666 & ~_umask())
+        os.replace(aside, path)
+    except BaseException:
+        Path(aside).unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def read(path: str | Path, layout: str) -> xr.Dataset:
+    """Read a file into memory and check that it is what its layout says.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If it is not of that layout, as `check` says.
+    """
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"there is no file {path}")
+    dataset = xr.load_dataset(path, engine="netcdf4")
+    check(dataset, layout)
+    return dataset
