@@ -196,8 +196,8 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
     """Force of each pole at rest.
 
     The front and the rear half of a magnet each pull evenly; the difference of the halves carries
-    the moment.  (A force linear in x would leave the innermost pole of an end magnet less than half of
-    that, 0.8 kN of 7.6 kN at its outermost.)  A middle pole takes the mean.
+    the moment.  (A force linear in x would leave the innermost pole of an end magnet less than half
+    of that: 0.8 kN beside 7.6 kN at the outermost.)  A middle pole takes the mean.
 
     Parameters
     ----------

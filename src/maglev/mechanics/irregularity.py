@@ -1,0 +1,311 @@
+"""Track irregularity along the line: harmonics on a target spectrum, or a measured profile.
+
+Vertical displacements are positive downwards, lateral ones to the right, like z and y; x is zero at
+the first pier.  Theory: docs/theory/irregularity.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from maglev.parameters import GermanLaw, Irregularity, PowerLaw, RationalLaw, Spectrum
+
+FloatArray = npt.NDArray[np.float64]
+
+PROFILE_NAMES = ("vertical_right", "vertical_left", "lateral_right", "lateral_left")
+"""Order of the ``profile`` dimension."""
+
+_POINTS_PER_WAVELENGTH = 200
+"""Grid points in the shortest wavelength: cubic Hermite interpolation errs by (2 pi / 200)^4 / 384
+= 2.5e-9 of the shortest cosine's amplitude, less than 1e-9 of the whole profile's extreme."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured profile, as read from a file.
+
+    Attributes
+    ----------
+    source
+        Where it comes from, for messages.
+    x : (station,)
+        Place along the line [m], strictly rising, zero at the first pier.
+    displacement : (4, station)
+        In the order of `PROFILE_NAMES` [m].
+    """
+
+    source: str
+    x: FloatArray
+    displacement: FloatArray
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Irregularity on a uniform grid, to be interpolated by cubic Hermite polynomials.
+
+    Attributes
+    ----------
+    x0
+        Place of the first grid point [m].
+    dx
+        Grid spacing [m].
+    values : (profile, grid)
+        Displacement of the rail from straight [m], in the order of `PROFILE_NAMES`.
+    slopes : (profile, grid)
+        Its derivative with respect to x [-].
+    """
+
+    x0: float
+    dx: float
+    values: FloatArray
+    slopes: FloatArray
+
+
+def profile(
+    irregularity: Irregularity,
+    length_range: tuple[float, float],
+    seed: int,
+    measured: Measured | None = None,
+) -> Profile:
+    """Irregularity of both rails in both directions over a stretch of line.
+
+    Nothing before ``x = -fade_in``, in full from ``x = 0``, in between times a ramp with continuous
+    curvature.  The same seed gives the same profile, bit for bit, whatever the stretch.
+
+    Parameters
+    ----------
+    irregularity
+        Spectra, wavelengths, fade-in; whether both sides share one profile.
+    length_range
+        First and last place needed [m]; the grid covers both.
+    seed
+        Seed of the phases; each row of the profile has its own child seed.
+    measured
+        Measured profile to take instead of the spectra; its file says what the sides share.
+
+    Returns
+    -------
+    profile
+        Displacements and slopes on a uniform grid.
+
+    Raises
+    ------
+    ValueError
+        If the range is empty, a profile file is named but not given, the measured profile does not
+        cover the range from the start of the fade-in, or a spectrum is negative.
+
+    References
+    ----------
+    Shinozuka, Deodatis, Appl. Mech. Rev. 44 (1991) 191-204, eq. 19; docs/theory/irregularity.md.
+    """
+    start, end = length_range
+    if not (math.isfinite(start) and math.isfinite(end) and start < end):
+        raise ValueError(f"length_range must rise from finite start to end, got {length_range} m")
+    block = irregularity.wavelength_min
+    first, last = math.floor(start / block), math.ceil(end / block)
+    dx = block / _POINTS_PER_WAVELENGTH
+    grid = np.arange(first * _POINTS_PER_WAVELENGTH, last * _POINTS_PER_WAVELENGTH + 1)
+    x = grid * dx
+    if not irregularity.enabled:
+        zeros = np.zeros((len(PROFILE_NAMES), x.size))
+        return Profile(x0=float(x[0]), dx=dx, values=zeros, slopes=zeros.copy())
+    if measured is not None:
+        values, slopes = _splined(measured, x, max(start, -irregularity.fade_in), end)
+    elif irregularity.profile_file is not None:
+        raise ValueError(
+            f"irregularity.profile_file is {irregularity.profile_file!r} but its profile was not "
+            "read; give it as 'measured'"
+        )
+    else:
+        values, slopes = _random(irregularity, first, last, seed)
+    ramp, ramp_slope = _fade_in(x, irregularity.fade_in)
+    return Profile(
+        x0=float(x[0]),
+        dx=dx,
+        values=ramp * values,
+        slopes=ramp * slopes + ramp_slope * values,
+    )
+
+
+def displacement(profile: Profile, x: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Interpolate a profile by cubic Hermite polynomials.
+
+    Parameters
+    ----------
+    profile
+        The profile.
+    x : (...)
+        Places [m].
+
+    Returns
+    -------
+    value : (profile, ...)
+        Displacement [m].
+    slope : (profile, ...)
+        Derivative with respect to x [-].
+
+    Raises
+    ------
+    ValueError
+        If a place lies outside the grid.
+    """
+    position = (np.asarray(x, dtype=float) - profile.x0) / profile.dx
+    n = profile.values.shape[1]
+    if not np.all((position >= 0) & (position <= n - 1)):
+        raise ValueError(
+            f"places must lie in the profile's range {profile.x0:g} to "
+            f"{profile.x0 + (n - 1) * profile.dx:g} m, got {np.min(x):g} to {np.max(x):g} m"
+        )
+    cell = np.minimum(position.astype(int), n - 2)
+    t, h = position - cell, profile.dx
+    r0, r1 = profile.values[:, cell], profile.values[:, cell + 1]
+    s0, s1 = h * profile.slopes[:, cell], h * profile.slopes[:, cell + 1]
+    quadratic, cubic = 3 * (r1 - r0) - 2 * s0 - s1, 2 * (r0 - r1) + s0 + s1
+    value = r0 + t * (s0 + t * (quadratic + t * cubic))
+    slope = (s0 + t * (2 * quadratic + t * 3 * cubic)) / h
+    return value, slope
+
+
+def spectral_density(spectrum: Spectrum, wavenumber: npt.ArrayLike) -> FloatArray:
+    """One-sided power spectral density S(n), whose integral over n > 0 is the variance.
+
+    Parameters
+    ----------
+    spectrum
+        Law and coefficients.
+    wavenumber : (...)
+        n = 1 / wavelength [1/m], positive.
+
+    Returns
+    -------
+    density : (...)
+        S(n) [m^3].
+
+    Raises
+    ------
+    ValueError
+        If the law is negative or not finite somewhere.
+
+    References
+    ----------
+    docs/theory/irregularity.md, eqs. 1 to 3.
+    """
+    n = np.asarray(wavenumber, dtype=float)
+    match spectrum:
+        case PowerLaw():
+            density = spectrum.coefficient * n**-spectrum.exponent
+        case RationalLaw():
+            with np.errstate(divide="ignore", invalid="ignore"):
+                density = np.polynomial.polynomial.polyval(
+                    n, spectrum.numerator
+                ) / np.polynomial.polynomial.polyval(n, spectrum.denominator)
+        case GermanLaw():
+            A, c, r = spectrum.roughness, spectrum.corner_c, spectrum.corner_r
+            omega = 2 * np.pi * n  # rad/m
+            density = 2 * np.pi * A * c**2 / ((omega**2 + r**2) * (omega**2 + c**2))
+    bad = ~(np.isfinite(density) & (density >= 0))
+    if np.any(bad):
+        raise ValueError(
+            f"spectrum with law {spectrum.law!r} must be finite and not negative, got "
+            f"{density[bad].flat[0]:g} m^3 at n = {n[bad].flat[0]:g} 1/m"
+        )
+    return density
+
+
+def wavenumbers(irregularity: Irregularity) -> tuple[FloatArray, float]:
+    """Midpoints of equal cells between the longest and the shortest wavelength.
+
+    Equal cells, as the sum then has no gaps seen by a stretch shorter than ``1 / spacing`` (1 km
+    for 1000 harmonics from 1 to 100 m); cells that widen with n would leave gaps at short waves.
+
+    Parameters
+    ----------
+    irregularity
+        Wavelengths and number of harmonics.
+
+    Returns
+    -------
+    wavenumber : (harmonic,)
+        n_k [1/m].
+    spacing
+        Width of a cell [1/m].
+    """
+    lowest = 1 / irregularity.wavelength_max
+    spacing = (1 / irregularity.wavelength_min - lowest) / irregularity.n_harmonics
+    return lowest + (np.arange(irregularity.n_harmonics) + 0.5) * spacing, spacing
+
+
+def _random(
+    irregularity: Irregularity, first: int, last: int, seed: int
+) -> tuple[FloatArray, FloatArray]:
+    """Sums of harmonics on the grid from block ``first`` to block ``last``, one row a profile."""
+    wavenumber, spacing = wavenumbers(irregularity)
+    children = np.random.SeedSequence(seed).spawn(len(PROFILE_NAMES))
+    rows = []
+    for spectrum, right, left in (
+        (irregularity.vertical, *children[:2]),
+        (irregularity.lateral, *children[2:]),
+    ):
+        amplitude = np.sqrt(2 * spectral_density(spectrum, wavenumber) * spacing)
+        sides = (right,) if irregularity.sides == "shared" else (right, left)
+        sums = []
+        for child in sides:
+            phase = 2 * np.pi * np.random.default_rng(child).random(wavenumber.size)
+            coefficient = amplitude * np.exp(1j * phase)
+            sums.append(
+                _harmonic_sum(coefficient, wavenumber, irregularity.wavelength_min, first, last)
+            )
+        rows += [sums[0], sums[-1]]
+    return np.stack([value for value, _ in rows]), np.stack([slope for _, slope in rows])
+
+
+def _harmonic_sum(
+    coefficient: npt.NDArray[np.complex128],
+    wavenumber: FloatArray,
+    block: float,
+    first: int,
+    last: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Real part of sum c_k exp(2 pi i n_k x) and its slope, block by block.
+
+    Within a block, x = x_block + s: the factors exp(2 pi i n_k s) serve all blocks, and every block
+    is the same product of the same shape wherever the stretch begins and ends.
+    """
+    points = _POINTS_PER_WAVELENGTH
+    within = np.arange(points) * (block / points)
+    rate = 2j * np.pi * wavenumber
+    fine = np.exp(np.outer(within, rate))
+    values, slopes = np.empty((2, (last - first + 1) * points))
+    for j in range(first, last + 1):
+        carrier = coefficient * np.exp(rate * (j * block))
+        both = fine @ np.column_stack([carrier, rate * carrier])
+        here = slice((j - first) * points, (j - first + 1) * points)
+        values[here], slopes[here] = both.real.T
+    size = (last - first) * points + 1
+    return values[:size], slopes[:size]
+
+
+def _splined(
+    measured: Measured, x: FloatArray, start: float, end: float
+) -> tuple[FloatArray, FloatArray]:
+    """Cubic spline through a measured profile; beyond its ends it keeps its last value."""
+    if measured.x[0] > start or measured.x[-1] < end:
+        raise ValueError(
+            f"{measured.source} must cover the run from {start:g} to {end:g} m, "
+            f"got {measured.x[0]:g} to {measured.x[-1]:g} m"
+        )
+    spline = CubicSpline(measured.x, measured.displacement, axis=1)
+    inside = np.clip(x, measured.x[0], measured.x[-1])
+    return spline(inside), np.where(inside == x, spline(inside, 1), 0.0)
+
+
+def _fade_in(x: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+    """Ramp from 0 at ``x = -length`` to 1 at ``x = 0`` with zero slope and curvature at both."""
+    t = np.clip(1 + x / length, 0.0, 1.0)
+    ramp = t**3 * (10 + t * (6 * t - 15))
+    return ramp, 30 * t**2 * (1 - t) ** 2 / length
