@@ -1,0 +1,504 @@
+"""Probability density evolution: from weighted extreme values to their density.
+
+The finite-difference solution adds a numerical kernel to the weighted points and nothing else, so
+the mesh is the bandwidth; it is chosen by a rule here.  Theory: docs/theory/pdem.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import gaussian_kde
+
+from maglev.uncertainty import _kernels
+from maglev.uncertainty.samples import (
+    FloatArray,
+    check_lost_probability,
+    checked_probability,
+    effective_size,
+    weighted_sample,
+)
+
+Process = Literal["sine", "linear"]
+Limiter = Literal["superbee", "minmod", "upwind"]
+
+_LIMITERS = {
+    "superbee": _kernels.SUPERBEE,
+    "minmod": _kernels.MINMOD,
+    "upwind": _kernels.UPWIND,
+}
+
+COURANT = 0.9
+"""Largest Courant number the time step aims at [-]; 1 would be exact for one point.  Assumed."""
+
+START = 3.0
+"""How far below the smallest value a virtual process starts [standard deviations].
+
+A process that starts among the values moves those near its start too little for the scheme to
+spread them, and the density keeps their spikes.  Assumed; see docs/theory/pdem.md, section 4.
+"""
+
+MOST_STEPS = 20_000
+"""Time steps beyond which a density is refused, some ten seconds for 1000 points.  Assumed."""
+
+_SMALLEST_MESH = 1 / 6  # of the bandwidth: bounds the work where a limiter smears more, assumed
+_RULE_POINTS = 16  # points whose kernels the mesh rule measures, assumed
+_RULE_ROUNDS = 12  # the rule contracts by a half or more per round, assumed
+_RULE_TOLERANCE = 0.02  # of the bandwidth, well below its own uncertainty, assumed
+_CHUNK = 512  # points whose increments are held in memory at once, assumed
+
+
+@dataclass(frozen=True)
+class EvolvedDensity:
+    """Density of an extreme value by the generalised density evolution equation.
+
+    Attributes
+    ----------
+    cell_centre : (cell,)
+        Centres of the cells [unit of the value].
+    density : (cell,)
+        Mean density in each cell [1/unit]; its integral is one less the lost probability.
+    mesh
+        Cell width [unit].
+    n_steps
+        Number of time steps over the virtual process.
+    largest_courant
+        Largest Courant number of any point and step [-].
+    bandwidth
+        Kernel deviation the mesh rule asked for, Silverman's [unit].
+    kernel_deviation
+        Root mean square deviation of the numerical kernel that came out [unit].
+    start
+        Value at which the virtual process starts [unit].
+    """
+
+    cell_centre: FloatArray
+    density: FloatArray
+    mesh: float
+    n_steps: int
+    largest_courant: float
+    bandwidth: float
+    kernel_deviation: float
+    start: float
+
+
+@dataclass(frozen=True)
+class FirstPassage:
+    """Survival of histories between absorbing barriers.
+
+    Attributes
+    ----------
+    survival : (time,)
+        Probability that no barrier has been reached, by the evolution equation [-].
+    exact_survival : (time,)
+        The same for the weighted histories themselves, without a numerical kernel [-].
+    cell_centre : (cell,)
+        Centres of the cells [unit of the histories].
+    density : (cell,)
+        Density of what remains at the last time [1/unit]; its integral is the last ``survival``.
+    mesh
+        Cell width used [unit].
+    """
+
+    survival: FloatArray
+    exact_survival: FloatArray
+    cell_centre: FloatArray
+    density: FloatArray
+    mesh: float
+
+
+def evolved_density(
+    values: npt.ArrayLike,
+    probability: npt.ArrayLike | None = None,
+    *,
+    process: Process = "sine",
+    limiter: Limiter = "superbee",
+    mesh: float | None = None,
+    start: float | None = None,
+    lost_probability: float = 0.0,
+) -> EvolvedDensity:
+    """Density of weighted values by PDEM: virtual process, GDEE, finite differences.
+
+    Values are standardised to zero mean and unit deviation, evolved from ``start`` by
+    ``Z = start + (Y - start) g(tau)`` with ``g = sin(2.5 pi tau)`` or ``g = tau`` over
+    ``0 <= tau <= 1``, and mapped back.  Courant numbers come from exact increments of Z.
+
+    Parameters
+    ----------
+    values : (sample,)
+        Extreme values of the held samples [their unit].
+    probability : (sample,), optional
+        Their probabilities given that they are held [-]; equal if not given.
+    process
+        Virtual process, ``"sine"`` or ``"linear"``.
+    limiter
+        Flux limiter, ``"superbee"``, ``"minmod"`` or ``"upwind"`` (first order).
+    mesh
+        Cell width [standard deviations].  If not given, the width at which the numerical kernel's
+        deviation is Silverman's bandwidth, but not below a sixth of it.
+    start
+        Where the virtual process starts [standard deviations from the mean].  If not given, three
+        deviations below the smallest value; 0 is the mean.
+    lost_probability
+        Probability of the samples that are lost [-]; the density is that of the held part and
+        integrates to one less this.
+
+    Returns
+    -------
+    evolved
+        The density with the mesh, the step and the kernel that made it.
+
+    Raises
+    ------
+    ValueError
+        If the sample is faulty or constant, an option is unknown, ``mesh`` is not positive,
+        ``start`` is not finite, ``lost_probability`` lies outside [0, 1), or values far out ask
+        for more than ``MOST_STEPS`` time steps.
+
+    References
+    ----------
+    Li, Chen, Stochastic Dynamics of Structures (2009), ch. 7; Chen, Li, Struct. Saf. 29 (2007)
+    77-93 (virtual process of an extreme value); docs/theory/pdem.md, eqs. (1) to (8).
+    """
+    values, probability = weighted_sample(values, probability)
+    if process not in ("sine", "linear"):
+        raise ValueError(f"process must be 'sine' or 'linear', got {process!r}")
+    code = _limiter_code(limiter)
+    check_lost_probability(lost_probability)
+    if mesh is not None and not (np.isfinite(mesh) and mesh > 0.0):
+        raise ValueError(f"mesh must be positive, got {mesh} standard deviations")
+    if start is not None and not np.isfinite(start):
+        raise ValueError(f"start must be finite, got {start} standard deviations")
+    mean, deviation = _moments(values, probability)
+    standard = (values - mean) / deviation
+    origin = float(standard.min()) - START if start is None else float(start)
+    bandwidth = silverman_bandwidth(standard, probability)
+    if mesh is None:
+        mesh = _mesh_by_rule(standard, probability, process, code, origin, bandwidth)
+    centre, cell_probability, spread, n_steps, largest = _virtual_evolution(
+        standard, probability, process, code, origin, mesh
+    )
+    filled = np.flatnonzero(cell_probability)
+    shown = slice(filled[0] - 1, filled[-1] + 2)  # the filled cells and an empty one on either side
+    return EvolvedDensity(
+        cell_centre=mean + deviation * centre[shown],
+        density=(1.0 - lost_probability) * cell_probability[shown] / (mesh * deviation),
+        mesh=mesh * deviation,
+        n_steps=n_steps,
+        largest_courant=largest,
+        bandwidth=bandwidth * deviation,
+        kernel_deviation=float(np.sqrt(probability @ spread)) * mesh * deviation,
+        start=mean + deviation * origin,
+    )
+
+
+def direct_density(
+    at: npt.ArrayLike,
+    values: npt.ArrayLike,
+    probability: npt.ArrayLike | None = None,
+    *,
+    bandwidth: float | None = None,
+    lost_probability: float = 0.0,
+) -> FloatArray:
+    """Density of weighted values by direct probability integration with a Gaussian kernel.
+
+    ``p(y) = (1 - P_lost) sum_q P_q N(y; Y_q, h)``: the exact solution of the evolution equation
+    with each Dirac function replaced by a normal density.
+
+    Parameters
+    ----------
+    at : (place,)
+        Where the density is wanted [unit of the value].
+    values : (sample,)
+        Extreme values of the held samples [their unit].
+    probability : (sample,), optional
+        Their probabilities given that they are held [-]; equal if not given.
+    bandwidth
+        Deviation h of the kernel [unit]; Silverman's if not given.
+    lost_probability
+        Probability of the samples that are lost [-].
+
+    Returns
+    -------
+    density : (place,)
+        Density of the held part [1/unit]; its integral is one less ``lost_probability``.
+
+    Raises
+    ------
+    ValueError
+        If the sample is faulty or constant, ``bandwidth`` is not positive, a place is not finite
+        or ``lost_probability`` lies outside [0, 1).
+
+    References
+    ----------
+    Chen, Yang, Comput. Methods Appl. Mech. Eng. 357 (2019) 112612; docs/theory/pdem.md, eq. (9).
+    """
+    values, probability = weighted_sample(values, probability)
+    check_lost_probability(lost_probability)
+    at = np.asarray(at, dtype=float)
+    if at.ndim != 1 or not np.all(np.isfinite(at)):
+        raise ValueError(f"places must be finite and have shape (place,), got shape {at.shape}")
+    mean, deviation = _moments(values, probability)
+    if bandwidth is None:
+        bandwidth = silverman_bandwidth(values, probability)
+    if not (np.isfinite(bandwidth) and bandwidth > 0.0):
+        raise ValueError(f"bandwidth must be positive, got {bandwidth}")
+    standard = (values - mean) / deviation
+    kernel = gaussian_kde(standard, bw_method=1.0, weights=probability)
+    kernel.set_bandwidth(bandwidth / deviation / float(np.sqrt(kernel.covariance[0, 0])))
+    return (1.0 - lost_probability) * kernel((at - mean) / deviation) / deviation
+
+
+def silverman_bandwidth(values: npt.ArrayLike, probability: npt.ArrayLike | None = None) -> float:
+    """Bandwidth ``0.9 min(deviation, quartile range / 1.34) n^(-1/5)`` of a weighted sample.
+
+    n is the effective size ``1 / sum(P^2)``.
+
+    Parameters
+    ----------
+    values : (sample,)
+        Extreme values [their unit].
+    probability : (sample,), optional
+        Their probabilities [-]; equal if not given.
+
+    Returns
+    -------
+    bandwidth
+        Kernel deviation [unit of the value].
+
+    Raises
+    ------
+    ValueError
+        If the sample is faulty or constant.
+
+    References
+    ----------
+    Silverman, Density Estimation (1986), eq. 3.31; docs/theory/pdem.md, eq. (8).
+    """
+    values, probability = weighted_sample(values, probability)
+    _, deviation = _moments(values, probability)
+    quarter, three_quarters = np.quantile(
+        values, [0.25, 0.75], weights=probability, method="inverted_cdf"
+    )
+    spread = min(deviation, (three_quarters - quarter) / 1.34)
+    if spread == 0.0:  # more than half of the probability at one value
+        spread = deviation
+    return float(0.9 * spread * effective_size(probability) ** -0.2)
+
+
+def first_passage(
+    histories: npt.ArrayLike,
+    probability: npt.ArrayLike | None = None,
+    *,
+    mesh: float,
+    lower: float | None = None,
+    upper: float | None = None,
+    limiter: Limiter = "superbee",
+) -> FirstPassage:
+    """Survival of weighted histories between barriers, by the GDEE with absorbing boundaries.
+
+    Probability that reaches a barrier is taken out and does not come back.  Histories are straight
+    between the given times, and those intervals are divided as the Courant number asks.  The
+    kernel reaches a barrier about its own width early: compare ``exact_survival``.
+
+    Parameters
+    ----------
+    histories : (sample, time)
+        Response Z_q(t) of every point at the same times [its unit].
+    probability : (sample,), optional
+        Assigned probabilities [-]; equal if not given.
+    mesh
+        Cell width [unit], at most; made smaller so that the barriers lie on faces.
+    lower, upper
+        Barriers [unit]; at least one.
+    limiter
+        Flux limiter, ``"superbee"``, ``"minmod"`` or ``"upwind"``.
+
+    Returns
+    -------
+    passage
+        Survival over time and the density of what remains.
+
+    Raises
+    ------
+    ValueError
+        If the histories or probabilities are faulty, there is no barrier, a history starts at or
+        outside one, or ``mesh`` is not positive.
+
+    References
+    ----------
+    Chen, Li, Struct. Saf. 27 (2005) 253-266 (absorbing boundary); docs/theory/pdem.md, eq. (10).
+    """
+    histories = np.asarray(histories, dtype=float)
+    if histories.ndim != 2 or histories.shape[0] < 1 or histories.shape[1] < 2:
+        raise ValueError(
+            f"histories have shape {histories.shape}, expected (sample, time) with two times or "
+            "more"
+        )
+    if not np.all(np.isfinite(histories)):
+        raise ValueError("histories must be finite, got NaN or infinity; leave lost samples out")
+    n = len(histories)
+    if probability is None:
+        probability = np.full(n, 1.0 / n)
+    probability = checked_probability(probability, n)
+    code = _limiter_code(limiter)
+    if not (np.isfinite(mesh) and mesh > 0.0):
+        raise ValueError(f"mesh must be positive, got {mesh}")
+    if lower is None and upper is None:
+        raise ValueError("first passage needs a barrier, got neither lower nor upper")
+    low = -np.inf if lower is None else float(lower)
+    high = np.inf if upper is None else float(upper)
+    inside = (histories[:, 0] > low) & (histories[:, 0] < high)
+    if not inside.all():
+        raise ValueError(
+            f"every history must start between the barriers {low} and {high}, got "
+            f"{np.count_nonzero(~inside)} of {n} that do not"
+        )
+    if np.isfinite(low) and np.isfinite(high):
+        mesh = (high - low) / np.ceil((high - low) / mesh)
+    increments = np.diff(histories, axis=1) / mesh
+    substeps = max(1, int(np.ceil(np.abs(increments).max() / COURANT)))
+    margin = _margin(substeps * increments.shape[1])
+    # Cells outside a barrier stay empty but for the one a step can reach before it is removed.
+    face = low if np.isfinite(low) else high
+    n_below = int(np.ceil((face - max(low, histories.min())) / mesh)) + margin
+    n_above = int(np.ceil((min(high, histories.max()) - face) / mesh)) + margin
+    n_cells = n_below + n_above
+    centre = face + mesh * (np.arange(n_cells) - n_below + 0.5)
+    first_kept = n_below if np.isfinite(low) else 0
+    past_kept = n_cells
+    if np.isfinite(high):
+        past_kept = n_below + round((high - face) / mesh)
+    cells = (histories[:, [0, -1]] - centre[0]) / mesh
+    total = np.zeros(n_cells)
+    survival = np.zeros(histories.shape[1])
+    _kernels.evolve(
+        increments / substeps,
+        substeps,
+        cells[:, 0],
+        cells[:, 1],
+        probability,
+        code,
+        first_kept,
+        past_kept,
+        np.zeros(n_cells),
+        total,
+        survival,
+        np.zeros(n),
+    )
+    reached = (histories <= low) | (histories >= high)
+    exact_survival = probability @ ~np.logical_or.accumulate(reached, axis=1)
+    return FirstPassage(
+        survival=survival,
+        exact_survival=exact_survival,
+        cell_centre=centre,
+        density=total / mesh,
+        mesh=float(mesh),
+    )
+
+
+def _virtual_evolution(
+    standard: FloatArray,
+    probability: FloatArray,
+    process: Process,
+    limiter: int,
+    start: float,
+    mesh: float,
+) -> tuple[FloatArray, FloatArray, FloatArray, int, float]:
+    """Cell centres, probability per cell, kernel spread per point [cell^2], steps, Courant.
+
+    The grid has a cell centre at ``start`` and a margin that the widest kernel does not fill.
+    """
+    travel = (standard - start) / mesh  # cells
+    farthest = float(np.abs(travel).max())
+    rate = 2.5 * np.pi if process == "sine" else 1.0  # largest slope of g
+    n_steps = max(1, int(np.ceil(rate * farthest / COURANT)))
+    if n_steps > MOST_STEPS:
+        raise ValueError(
+            f"a mesh of {mesh:.3g} standard deviations needs {n_steps} time steps over values that "
+            f"spread this far, expected {MOST_STEPS} at most; give a wider mesh, take logarithms "
+            "of the values, or use direct_density"
+        )
+    tau = np.arange(n_steps + 1) / n_steps
+    g = np.sin(2.5 * np.pi * tau) if process == "sine" else tau
+    margin = _margin(n_steps)
+    backward = -min(0.0, float(travel.min()), *([-float(travel.max())] * (process == "sine")))
+    forward = max(0.0, float(travel.max()), *([-float(travel.min())] * (process == "sine")))
+    n_below, n_above = int(np.ceil(backward)) + margin, int(np.ceil(forward)) + margin
+    n_cells = n_below + 1 + n_above
+    total, work = np.zeros(n_cells), np.zeros(n_cells)
+    survival, spread = np.zeros(n_steps + 1), np.zeros(standard.size)
+    increment = np.diff(g)
+    for a in range(0, standard.size, _CHUNK):
+        part = slice(a, a + _CHUNK)
+        _kernels.evolve(
+            np.outer(travel[part], increment),
+            1,
+            np.full(travel[part].size, float(n_below)),
+            n_below + travel[part],
+            probability[part],
+            limiter,
+            0,
+            n_cells,
+            work,
+            total,
+            survival,
+            spread[part],
+        )
+    centre = start + mesh * (np.arange(n_cells) - n_below)
+    return centre, total, spread, n_steps, farthest * float(np.abs(increment).max())
+
+
+def _mesh_by_rule(
+    standard: FloatArray,
+    probability: FloatArray,
+    process: Process,
+    limiter: int,
+    start: float,
+    bandwidth: float,
+) -> float:
+    """Cell width [deviations] at which the numerical kernel's deviation is ``bandwidth``.
+
+    Fixed-point iteration on the kernels of a few values at even steps of probability and of the
+    farthest one, which sets the time step.
+    """
+    levels = (np.arange(_RULE_POINTS) + 0.5) / _RULE_POINTS
+    chosen = np.quantile(standard, levels, weights=probability, method="inverted_cdf")
+    farthest = standard[np.argmax(np.abs(standard - start))]
+    points = np.append(chosen, farthest)
+    weights = np.append(np.full(_RULE_POINTS, 1.0 / _RULE_POINTS), 0.0)
+    smallest = _SMALLEST_MESH * bandwidth
+    mesh = bandwidth
+    for _ in range(_RULE_ROUNDS):
+        spread = _virtual_evolution(points, weights, process, limiter, start, mesh)[2]
+        deviation = float(np.sqrt(weights @ spread)) * mesh
+        if mesh == smallest or abs(deviation / bandwidth - 1.0) < _RULE_TOLERANCE:
+            break
+        mesh = max(mesh * bandwidth / deviation, smallest)
+    return mesh
+
+
+def _margin(n_steps: int) -> int:
+    """Cells beyond the farthest value: eight deviations of the widest (upwind) kernel."""
+    return int(np.ceil(4.0 * np.sqrt(n_steps))) + 4  # variance n c (1 - c) <= n / 4, scheme's reach
+
+
+def _moments(values: FloatArray, probability: FloatArray) -> tuple[float, float]:
+    """Mean and deviation of a weighted sample; refuses a constant one."""
+    mean = float(probability @ values)
+    deviation = float(np.sqrt(probability @ (values - mean) ** 2))
+    if not deviation > 1e-12 * float(np.abs(values).max()):  # rounding of the mean
+        raise ValueError(
+            f"values must differ, got {values.size} of the same value {values[0]}: a constant "
+            "response has no density"
+        )
+    return mean, deviation
+
+
+def _limiter_code(limiter: str) -> int:
+    if limiter not in _LIMITERS:
+        raise ValueError(f"limiter must be one of {', '.join(_LIMITERS)}, got {limiter!r}")
+    return _LIMITERS[limiter]

@@ -1,0 +1,612 @@
+"""Probability of exceedance, limits at given failure probabilities, distances of distributions.
+
+A lost sample is a failure for every limit.  Theory: docs/theory/reliability.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from maglev.uncertainty.samples import (
+    FloatArray,
+    check_lost_probability,
+    effective_size,
+    weighted_sample,
+)
+
+FAILURE_PROBABILITIES = (1e-1, 1e-2, 1e-3)
+"""Levels at which limits are given by default."""
+
+CARRIED = 10.0
+"""Expected exceedances that a sample needs to carry a level; fewer and no number is given."""
+
+GIVEN, BEYOND_SAMPLE, LOST = "given", "beyond the sample", "exceeded by the lost samples"
+"""What can be said of a limit: see ``Limits.status``."""
+
+_ROUNDING = 1e-12  # of a sum of probabilities, so that 1000 samples carry exactly one at 1e-3
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of an extreme value: the smallest value whose exceedance is at most the level.
+
+    Attributes
+    ----------
+    failure_probability : (level,)
+        Failure probabilities [-].
+    limit : (level,)
+        Limits [unit of the value]; NaN where ``status`` is not ``"given"``.
+    lower, upper : (level,) or None
+        Ends of the interval [unit]; infinite where the sample does not bound that side, NaN
+        where ``limit`` is, None where no interval can be had.
+    expected_exceedances : (level,)
+        Number of held samples expected beyond the limit [-].
+    status : (level,)
+        ``"given"``; ``"beyond the sample"`` with fewer than ten expected exceedances; or
+        ``"exceeded by the lost samples"``, where losses alone are likelier than the level and no
+        finite limit exists.
+    confidence
+        Confidence of the interval [-]; None with no interval.
+    """
+
+    failure_probability: FloatArray
+    limit: FloatArray
+    lower: FloatArray | None
+    upper: FloatArray | None
+    expected_exceedances: FloatArray
+    status: tuple[str, ...]
+    confidence: float | None
+
+
+def exceedance(
+    at: npt.ArrayLike,
+    values: npt.ArrayLike,
+    probability: npt.ArrayLike | None = None,
+    *,
+    lost_probability: float = 0.0,
+) -> FloatArray:
+    """Probability of exceedance from the exact weighted distribution function.
+
+    ``POE(y) = P_lost + (1 - P_lost) sum_q P_q I{Y_q > y}``.
+
+    Parameters
+    ----------
+    at : (place,)
+        Values y [unit of the extreme value].
+    values : (sample,)
+        Extreme values of the held samples [their unit].
+    probability : (sample,), optional
+        Their probabilities given that they are held [-]; equal if not given.
+    lost_probability
+        Probability of the samples that are lost [-].
+
+    Returns
+    -------
+    exceedance : (place,)
+        P(Y > y or lost) [-].
+
+    Raises
+    ------
+    ValueError
+        If the sample is faulty, a place is NaN or ``lost_probability`` lies outside [0, 1).
+
+    References
+    ----------
+    docs/theory/reliability.md, eq. (2).
+    """
+    values, probability = weighted_sample(values, probability)
+    check_lost_probability(lost_probability)
+    at = _checked_places(at)
+    order, beyond = _beyond(values, probability)
+    held = beyond[np.searchsorted(values[order], at, side="right")]
+    return lost_probability + (1.0 - lost_probability) * held
+
+
+def density_exceedance(
+    at: npt.ArrayLike, cell_centre: npt.ArrayLike, density: npt.ArrayLike
+) -> FloatArray:
+    """Probability of exceedance from a density given as cell means.
+
+    ``POE(y) = 1 - integral of p up to y``; what the density lacks of one is the lost probability
+    and so counts as exceeded everywhere.
+
+    Parameters
+    ----------
+    at : (place,)
+        Values y [unit of the extreme value].
+    cell_centre : (cell,)
+        Centres of cells of equal width [unit], ascending.
+    density : (cell,)
+        Mean density in each cell [1/unit].
+
+    Returns
+    -------
+    exceedance : (place,)
+        P(Y > y or lost) [-].
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, the cells are not of equal width, a density is negative or not finite,
+        or it integrates to more than one.
+
+    References
+    ----------
+    docs/theory/reliability.md, eq. (3).
+    """
+    at = _checked_places(at)
+    cell_centre, density = _checked_density(cell_centre, density)
+    width = np.diff(cell_centre)
+    mesh = float(width.mean())
+    if not np.allclose(width, mesh, rtol=1e-6, atol=0.0):
+        raise ValueError(
+            f"cells must have one width, got {width.min()} to {width.max()}; interpolate first"
+        )
+    below = np.concatenate(([0.0], np.cumsum(density) * mesh))
+    if below[-1] > 1.0 + 1e-9:
+        raise ValueError(f"a density must integrate to 1 or less, got {below[-1]}")
+    faces = cell_centre[0] + mesh * (np.arange(density.size + 1) - 0.5)
+    return 1.0 - np.interp(at, faces, below)
+
+
+def sample_limits(
+    values: npt.ArrayLike,
+    failure_probability: npt.ArrayLike = FAILURE_PROBABILITIES,
+    *,
+    n_lost: int = 0,
+    confidence: float = 0.95,
+) -> Limits:
+    """Limits of independent, equally weighted samples, with exact order-statistic intervals.
+
+    Lost samples stand above every held one.  The interval holds the true limit with at least
+    ``confidence``, whatever the distribution.
+
+    Parameters
+    ----------
+    values : (held,)
+        Extreme values of the held samples [their unit].
+    failure_probability : (level,)
+        Failure probabilities [-].
+    n_lost
+        Number of lost samples beside them.
+    confidence
+        Two-sided confidence of the intervals [-].
+
+    Returns
+    -------
+    limits
+        One limit per level.
+
+    Raises
+    ------
+    ValueError
+        If the sample is faulty, a level or the confidence lies outside (0, 1), or ``n_lost`` is
+        negative.
+
+    References
+    ----------
+    David, Nagaraja, Order Statistics (2003), sec. 7.1; docs/theory/reliability.md, eqs. (4), (5).
+    """
+    values, _ = weighted_sample(values)
+    levels = _checked_levels(failure_probability)
+    _check_confidence(confidence)
+    if n_lost < 0:
+        raise ValueError(f"the number of lost samples must be zero or positive, got {n_lost}")
+    n = values.size + n_lost
+    ranked = np.concatenate((np.sort(values), np.full(n_lost, np.inf)))
+    expected = n * levels - n_lost
+    status = _status(expected, lost=n_lost / n >= levels)
+    given = np.array(status) == GIVEN
+    allowed = np.floor(n * levels * (1.0 + _ROUNDING)).astype(int)
+    limit = np.where(given, ranked[n - allowed - 1], np.nan)
+    first, last = _order_statistics(n, 1.0 - levels, confidence)
+    padded = np.concatenate(([-np.inf], ranked, [np.inf]))  # order statistics 0 and n + 1
+    return Limits(
+        failure_probability=levels,
+        limit=limit,
+        lower=np.where(given, padded[first], np.nan),
+        upper=np.where(given, padded[last], np.nan),
+        expected_exceedances=np.maximum(expected, 0.0),
+        status=status,
+        confidence=confidence,
+    )
+
+
+def weighted_limits(
+    values: npt.ArrayLike,
+    probability: npt.ArrayLike,
+    failure_probability: npt.ArrayLike = FAILURE_PROBABILITIES,
+    *,
+    lost_probability: float = 0.0,
+) -> Limits:
+    """Limits of samples with assigned probabilities, off the exact weighted distribution.
+
+    A point set is designed, not drawn, so it has no binomial interval and none is given.  The
+    expected exceedances are those of its effective size ``1 / sum(P^2)``.
+
+    Parameters
+    ----------
+    values : (sample,)
+        Extreme values of the held samples [their unit].
+    probability : (sample,)
+        Their probabilities given that they are held [-].
+    failure_probability : (level,)
+        Failure probabilities [-].
+    lost_probability
+        Probability of the samples that are lost [-].
+
+    Returns
+    -------
+    limits
+        One limit per level, without intervals.
+
+    Raises
+    ------
+    ValueError
+        If the sample is faulty, a level lies outside (0, 1) or ``lost_probability`` outside
+        [0, 1).
+
+    References
+    ----------
+    docs/theory/reliability.md, eq. (4).
+    """
+    values, probability = weighted_sample(values, probability)
+    levels = _checked_levels(failure_probability)
+    check_lost_probability(lost_probability)
+    held_level = (levels - lost_probability) / (1.0 - lost_probability)
+    expected = effective_size(probability) * held_level
+    status = _status(expected, lost=held_level <= 0.0)
+    given = np.array(status) == GIVEN
+    return Limits(
+        failure_probability=levels,
+        limit=np.where(given, _quantile(values, probability, held_level), np.nan),
+        lower=None,
+        upper=None,
+        expected_exceedances=np.maximum(expected, 0.0),
+        status=status,
+        confidence=None,
+    )
+
+
+def surrogate_limits(
+    predictions: npt.ArrayLike,
+    failure_probability: npt.ArrayLike = FAILURE_PROBABILITIES,
+    *,
+    residuals: npt.ArrayLike | None = None,
+    standard_deviation: npt.ArrayLike | None = None,
+    lost_probability: float = 0.0,
+    lost_interval: tuple[float, float] | None = None,
+    confidence: float = 0.95,
+) -> Limits:
+    """Limits off a surrogate's predictions, its own error carried through to the interval.
+
+    The surrogate's error is taken to have one sign all over the tail, the worst case: the lower
+    end is the order-statistic lower end of ``prediction + low error``, the upper end likewise.
+    The low and high errors are conservative quantiles of the leave-one-out residuals, or the
+    posterior deviation of each prediction times a normal quantile.  Sampling and surrogate error
+    each have ``confidence``, so both together have at least ``2 confidence - 1``.
+
+    Parameters
+    ----------
+    predictions : (sample,)
+        Surrogate's values at independent draws of the inputs that are held [their unit].
+    failure_probability : (level,)
+        Failure probabilities [-].
+    residuals : (training,), optional
+        Leave-one-out residuals, computed value less prediction [unit]; those of the training
+        points near the tail alone, where errors differ across the domain.
+    standard_deviation : (sample,), optional
+        Posterior deviation of each prediction [unit].  Exactly one of the two is to be given.
+    lost_probability
+        Probability that a sample is lost [-].
+    lost_interval
+        Lower and upper end of the interval of ``lost_probability`` [-]; without it the
+        probability is taken as exact.
+    confidence
+        Two-sided confidence of each part [-].
+
+    Returns
+    -------
+    limits
+        One limit per level; the limit itself is that of the plain predictions.
+
+    Raises
+    ------
+    ValueError
+        If the predictions are faulty, not exactly one of ``residuals`` and ``standard_deviation``
+        is given, it is faulty, there are too few residuals for the confidence, a level or the
+        confidence lies outside (0, 1), or the loss probabilities are out of range or order.
+
+    References
+    ----------
+    Barber et al., Ann. Stat. 49 (2021) 486-507 (rank of a leave-one-out residual); Rasmussen,
+    Williams, Gaussian Processes for Machine Learning (2006), eq. 2.26; docs/theory/reliability.md,
+    eqs. (6) to (8).
+    """
+    predictions, probability = weighted_sample(predictions)
+    levels = _checked_levels(failure_probability)
+    check_lost_probability(lost_probability)
+    _check_confidence(confidence)
+    if lost_interval is None:
+        lost_interval = (lost_probability, lost_probability)
+    fewest, most = lost_interval
+    if not 0.0 <= fewest <= lost_probability <= most < 1.0:
+        raise ValueError(
+            f"the interval of the lost probability must hold it within [0, 1), got {fewest} to "
+            f"{most} around {lost_probability}"
+        )
+    if (residuals is None) == (standard_deviation is None):
+        raise ValueError(
+            "the surrogate's error must be given as either residuals or standard_deviation, got "
+            + ("neither" if residuals is None else "both")
+        )
+    low: float | FloatArray
+    high: float | FloatArray
+    if residuals is not None:
+        low, high = _residual_quantiles(residuals, confidence)
+    else:
+        spread = np.asarray(standard_deviation, dtype=float)
+        if spread.shape != predictions.shape:
+            raise ValueError(
+                f"standard deviations have shape {spread.shape}, expected that of the "
+                f"predictions, {predictions.shape}"
+            )
+        if not np.all(np.isfinite(spread) & (spread >= 0.0)):
+            raise ValueError("standard deviations must be finite and zero or positive")
+        high = float(stats.norm.ppf(0.5 + 0.5 * confidence)) * spread
+        low = -high
+    n = predictions.size
+    held_level = (levels - lost_probability) / (1.0 - lost_probability)
+    status = _status(n * held_level, lost=held_level <= 0.0)
+    given = np.array(status) == GIVEN
+
+    def end(shift: float | FloatArray, loss: float, side: int) -> FloatArray:
+        level = (levels - loss) / (1.0 - loss)
+        padded = np.concatenate(([-np.inf], np.sort(predictions + shift), [np.inf]))
+        place = np.full(levels.shape, n + 1)  # no finite end where losses alone exceed the level
+        finite = level > 0.0
+        place[finite] = _order_statistics(n, 1.0 - level[finite], confidence)[side]
+        return np.where(given, padded[place], np.nan)
+
+    return Limits(
+        failure_probability=levels,
+        limit=np.where(given, _quantile(predictions, probability, held_level), np.nan),
+        lower=end(low, fewest, 0),
+        upper=end(high, most, 1),
+        expected_exceedances=np.maximum(n * held_level, 0.0),
+        status=status,
+        confidence=confidence,
+    )
+
+
+def kolmogorov_distance(
+    values_a: npt.ArrayLike,
+    values_b: npt.ArrayLike,
+    probability_a: npt.ArrayLike | None = None,
+    probability_b: npt.ArrayLike | None = None,
+) -> float:
+    """Largest difference of two weighted distribution functions.
+
+    Parameters
+    ----------
+    values_a, values_b : (sample,)
+        Values of the two samples [the same unit].
+    probability_a, probability_b : (sample,), optional
+        Their probabilities [-]; equal if not given.
+
+    Returns
+    -------
+    distance
+        ``sup_y |F_a(y) - F_b(y)|`` [-], between 0 and 1.
+
+    Raises
+    ------
+    ValueError
+        If a sample is faulty.
+
+    References
+    ----------
+    docs/theory/reliability.md, eq. (9).
+    """
+    both = np.concatenate((np.asarray(values_a, dtype=float), np.asarray(values_b, dtype=float)))
+    a = exceedance(both, values_a, probability_a)
+    b = exceedance(both, values_b, probability_b)
+    return float(np.abs(a - b).max())
+
+
+def kolmogorov_noise(n_a: int, n_b: int, confidence: float = 0.95) -> float:
+    """Kolmogorov distance that two samples of one distribution stay below, for large samples.
+
+    Parameters
+    ----------
+    n_a, n_b
+        Numbers of independent, equally weighted samples.
+    confidence
+        Probability that the distance stays below [-].
+
+    Returns
+    -------
+    distance
+        Quantile of the distance [-]; no comparison of the two samples can be finer.
+
+    Raises
+    ------
+    ValueError
+        If a number is not positive or the confidence lies outside (0, 1).
+
+    References
+    ----------
+    Smirnov, Ann. Math. Stat. 19 (1948) 279-281; scipy.stats.kstwobign.
+    """
+    if n_a < 1 or n_b < 1:
+        raise ValueError(f"sample sizes must be positive, got {n_a} and {n_b}")
+    _check_confidence(confidence)
+    return float(stats.kstwobign.ppf(confidence) * np.sqrt(1.0 / n_a + 1.0 / n_b))
+
+
+def wasserstein_distance(
+    values_a: npt.ArrayLike,
+    values_b: npt.ArrayLike,
+    probability_a: npt.ArrayLike | None = None,
+    probability_b: npt.ArrayLike | None = None,
+) -> float:
+    """Mean distance that probability has to be moved from one sample to become the other.
+
+    Parameters
+    ----------
+    values_a, values_b : (sample,)
+        Values of the two samples [the same unit].
+    probability_a, probability_b : (sample,), optional
+        Their probabilities [-]; equal if not given.
+
+    Returns
+    -------
+    distance
+        ``integral |F_a - F_b| dy`` [unit of the values].
+
+    Raises
+    ------
+    ValueError
+        If a sample is faulty.
+
+    References
+    ----------
+    scipy.stats.wasserstein_distance; docs/theory/reliability.md, eq. (10).
+    """
+    values_a, probability_a = weighted_sample(values_a, probability_a)
+    values_b, probability_b = weighted_sample(values_b, probability_b)
+    return float(stats.wasserstein_distance(values_a, values_b, probability_a, probability_b))
+
+
+def density_distance(
+    at_a: npt.ArrayLike, density_a: npt.ArrayLike, at_b: npt.ArrayLike, density_b: npt.ArrayLike
+) -> float:
+    """Integral of the absolute difference of two densities (L1).
+
+    Each density is a straight line between its own places and zero outside them; the integral is
+    exact for that.
+
+    Parameters
+    ----------
+    at_a, at_b : (place,)
+        Places, ascending, of either density [the same unit].
+    density_a, density_b : (place,)
+        The densities there [1/unit].
+
+    Returns
+    -------
+    distance
+        ``integral |p_a - p_b| dy`` [-], between 0 and 2.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, places do not ascend, or a density is negative or not finite.
+
+    References
+    ----------
+    docs/theory/reliability.md, eq. (11).
+    """
+    at_a, density_a = _checked_density(at_a, density_a)
+    at_b, density_b = _checked_density(at_b, density_b)
+    places = np.union1d(at_a, at_b)
+    left = np.zeros(places.size - 1)
+    right = np.zeros(places.size - 1)
+    for at, density, sign in ((at_a, density_a, 1.0), (at_b, density_b, -1.0)):
+        inside = (places[:-1] >= at[0]) & (places[1:] <= at[-1])
+        here = np.interp(places, at, density)
+        left += sign * here[:-1] * inside
+        right += sign * here[1:] * inside
+    a, b = np.abs(left), np.abs(right)
+    crossing = left * right < 0.0
+    mean = 0.5 * (a + b)
+    mean[crossing] = 0.5 * (a[crossing] ** 2 + b[crossing] ** 2) / (a[crossing] + b[crossing])
+    return float(mean @ np.diff(places))
+
+
+def _beyond(values: FloatArray, probability: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
+    """Ascending order of the values, and the probability left beyond the first k of them."""
+    order = np.argsort(values, kind="stable")
+    beyond = np.append(np.cumsum(probability[order][::-1])[::-1], 0.0)
+    return order, beyond
+
+
+def _quantile(values: FloatArray, probability: FloatArray, levels: FloatArray) -> FloatArray:
+    """Smallest value whose exceedance is at most each level; the largest where that is negative."""
+    order, beyond = _beyond(values, probability)
+    # beyond[k + 1] is the exceedance of the k-th smallest value and does not grow with k
+    place = np.searchsorted(-beyond[1:], -(levels + _ROUNDING), side="left")
+    return values[order][np.minimum(place, values.size - 1)]
+
+
+def _order_statistics(
+    n: int, quantile: FloatArray, confidence: float
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Ranks, 0 to n + 1, of the order statistics that hold a quantile with the confidence."""
+    outside = 0.5 * (1.0 - confidence)
+    first = stats.binom.ppf(outside, n, quantile).astype(np.int64)
+    last = stats.binom.ppf(1.0 - outside, n, quantile).astype(np.int64) + 1
+    return first, last
+
+
+def _residual_quantiles(residuals: npt.ArrayLike, confidence: float) -> tuple[float, float]:
+    """Conservative lower and upper quantile of leave-one-out residuals, by rank of n + 1."""
+    residuals = np.asarray(residuals, dtype=float)
+    if residuals.ndim != 1 or not np.all(np.isfinite(residuals)):
+        raise ValueError(
+            f"residuals must be finite and have shape (training,), got shape {residuals.shape}"
+        )
+    n = residuals.size
+    rank = int(np.floor(0.5 * (1.0 - confidence) * (n + 1) * (1.0 + _ROUNDING)))
+    if rank < 1:
+        fewest = int(np.ceil(2.0 / (1.0 - confidence) * (1.0 - _ROUNDING))) - 1
+        raise ValueError(
+            f"a confidence of {confidence} needs at least {fewest} residuals, got {n}; train on "
+            "more points or lower the confidence"
+        )
+    ranked = np.sort(residuals)
+    return float(ranked[rank - 1]), float(ranked[n - rank])
+
+
+def _status(expected: FloatArray, lost: npt.NDArray[np.bool_]) -> tuple[str, ...]:
+    return tuple(
+        LOST if none_finite else GIVEN if count * (1.0 + _ROUNDING) >= CARRIED else BEYOND_SAMPLE
+        for count, none_finite in zip(expected, lost, strict=True)
+    )
+
+
+def _checked_levels(failure_probability: npt.ArrayLike) -> FloatArray:
+    levels = np.atleast_1d(np.asarray(failure_probability, dtype=float))
+    if levels.ndim != 1 or not np.all((levels > 0.0) & (levels < 1.0)):
+        raise ValueError(f"failure probabilities must lie in (0, 1), got {failure_probability}")
+    return levels
+
+
+def _checked_places(at: npt.ArrayLike) -> FloatArray:
+    at = np.atleast_1d(np.asarray(at, dtype=float))
+    if at.ndim != 1 or np.any(np.isnan(at)):
+        raise ValueError(f"places must have shape (place,) and not be NaN, got shape {at.shape}")
+    return at
+
+
+def _checked_density(at: npt.ArrayLike, density: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    at, density = np.asarray(at, dtype=float), np.asarray(density, dtype=float)
+    if at.ndim != 1 or at.size < 2 or density.shape != at.shape:
+        raise ValueError(
+            f"places and densities have shapes {at.shape} and {density.shape}, expected (place,) "
+            "twice, with two places or more"
+        )
+    if not (np.all(np.isfinite(at)) and np.all(np.diff(at) > 0.0)):
+        raise ValueError("places of a density must be finite and ascend")
+    if not np.all(np.isfinite(density) & (density >= 0.0)):
+        raise ValueError("densities must be finite and zero or positive")
+    return at, density
+
+
+def _check_confidence(confidence: float) -> None:
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence must lie in (0, 1), got {confidence}")

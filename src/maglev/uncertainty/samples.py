@@ -1,0 +1,198 @@
+"""Weighted samples of an extreme value: their check, their part that is held, their size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+SUM_TOLERANCE = 1e-9
+"""How far probabilities may sum from one: far above rounding, far below one point's. Assumed."""
+
+
+@dataclass(frozen=True)
+class HeldPart:
+    """The samples that have an extreme value, and the probability of those that have none.
+
+    Attributes
+    ----------
+    values : (held,)
+        Extreme values [their unit].
+    probability : (held,)
+        Probabilities given that the sample is held [-], sum to one.
+    lost_probability
+        Probability of the samples that are lost [-].
+    n_lost
+        Number of lost samples.
+    """
+
+    values: FloatArray
+    probability: FloatArray
+    lost_probability: float
+    n_lost: int
+
+
+def weighted_sample(
+    values: npt.ArrayLike, probability: npt.ArrayLike | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Values and probabilities as checked arrays; equal weights if no probability is given.
+
+    Parameters
+    ----------
+    values : (sample,)
+        Extreme values [their unit].
+    probability : (sample,), optional
+        Assigned probabilities [-].
+
+    Returns
+    -------
+    values, probability : (sample,)
+        The same, as arrays.
+
+    Raises
+    ------
+    ValueError
+        If there is no value, a shape is wrong, a value is not finite, a probability is negative
+        or they do not sum to one.
+    """
+    values = np.asarray(values, dtype=float)
+    if values.ndim != 1 or values.size == 0:
+        raise ValueError(f"values have shape {values.shape}, expected (sample,) with one or more")
+    n_bad = np.count_nonzero(~np.isfinite(values))
+    if n_bad:
+        raise ValueError(
+            f"values must be finite, got {n_bad} of {values.size} that are not; take lost samples "
+            "out with held_part first"
+        )
+    if probability is None:
+        return values, np.full(values.size, 1.0 / values.size)
+    return values, checked_probability(probability, values.size)
+
+
+def checked_probability(probability: npt.ArrayLike, n: int) -> FloatArray:
+    """Assigned probabilities as a checked array.
+
+    Parameters
+    ----------
+    probability : (sample,)
+        Assigned probabilities [-].
+    n
+        Number of samples expected.
+
+    Returns
+    -------
+    probability : (sample,)
+        The same, as an array.
+
+    Raises
+    ------
+    ValueError
+        If their number is not ``n``, one is negative or NaN, or they do not sum to one.
+    """
+    probability = np.asarray(probability, dtype=float)
+    if probability.shape != (n,):
+        raise ValueError(
+            f"probabilities have shape {probability.shape}, expected (sample,) = ({n},)"
+        )
+    if not np.all(probability >= 0.0):
+        raise ValueError(
+            f"probabilities must be zero or positive, got {np.min(probability)} as the smallest"
+        )
+    if abs(probability.sum() - 1.0) > SUM_TOLERANCE:
+        raise ValueError(
+            f"probabilities must sum to 1, got {probability.sum()}; if lost samples were left "
+            "out, let held_part do it"
+        )
+    return probability
+
+
+def check_lost_probability(lost_probability: float) -> None:
+    """Refuse a probability of lost samples that leaves nothing held.
+
+    Parameters
+    ----------
+    lost_probability
+        Probability of the samples that are lost [-].
+
+    Raises
+    ------
+    ValueError
+        If it lies outside [0, 1).
+    """
+    if not 0.0 <= lost_probability < 1.0:
+        raise ValueError(f"lost probability must lie in [0, 1), got {lost_probability}")
+
+
+def held_part(
+    values: npt.ArrayLike, lost: npt.ArrayLike, probability: npt.ArrayLike | None = None
+) -> HeldPart:
+    """Split off the lost samples, which have no extreme value and are failures for every limit.
+
+    Parameters
+    ----------
+    values : (sample,)
+        Extreme values [their unit]; anything, NaN too, where ``lost``.
+    lost : (sample,)
+        True where the sample is lost.
+    probability : (sample,), optional
+        Assigned probabilities of all samples [-]; equal if not given.
+
+    Returns
+    -------
+    held
+        The held samples with conditional probabilities, and the probability of the lost ones.
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, ``lost`` is not boolean, no sample is held, a held value is not finite
+        or the probabilities do not sum to one.
+
+    References
+    ----------
+    docs/theory/reliability.md, eq. (2).
+    """
+    values, lost = np.asarray(values, dtype=float), np.asarray(lost)
+    if values.ndim != 1 or lost.shape != values.shape or lost.dtype != np.bool_:
+        raise ValueError(
+            f"values and lost have shapes {values.shape} and {lost.shape} and lost has type "
+            f"{lost.dtype}, expected (sample,) twice and bool"
+        )
+    if lost.all():
+        raise ValueError(f"at least one sample must be held, got {lost.size} lost of {lost.size}")
+    if probability is None:
+        probability = np.full(values.size, 1.0 / values.size)
+    probability = checked_probability(probability, values.size)
+    held_values, _ = weighted_sample(values[~lost])
+    held_probability = probability[~lost].sum()
+    if held_probability == 0.0:
+        raise ValueError("the held samples must have a positive probability, got 0 in total")
+    return HeldPart(
+        values=held_values,
+        probability=probability[~lost] / held_probability,
+        lost_probability=float(probability[lost].sum()),
+        n_lost=int(np.count_nonzero(lost)),
+    )
+
+
+def effective_size(probability: npt.ArrayLike) -> float:
+    """Number of equally weighted samples that spread the probability as evenly, 1 / sum(P^2).
+
+    Parameters
+    ----------
+    probability : (sample,)
+        Probabilities [-] that sum to one.
+
+    Returns
+    -------
+    size
+        Between 1 and the number of samples [-].
+
+    References
+    ----------
+    Kish, Survey Sampling (1965), sec. 11.7.
+    """
+    return float(1.0 / np.sum(np.square(np.asarray(probability, dtype=float))))
