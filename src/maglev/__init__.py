@@ -1,1 +1,26 @@
 """Dynamic reliability of high-speed EMS maglev trains on guideway bridges."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from maglev.config import ConfigError, load_config
+    from maglev.simulation import simulate
+
+__all__ = ["ConfigError", "load_config", "simulate"]
+
+_HOME = {
+    "ConfigError": "maglev.config",
+    "load_config": "maglev.config",
+    "simulate": "maglev.simulation",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import the public names when first used: compiled parts take seconds to import."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'maglev' has no attribute '{name}'")
+    from importlib import import_module
+
+    return getattr(import_module(_HOME[name]), name)

@@ -10,9 +10,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -268,12 +268,12 @@ def _table() -> dict[str, Variable]:
     table["static_deflection"] = Variable(
         dims=(),
         units="m",
-        long_name="largest vertical deflection at midspan of the middle span under the train at rest",
+        long_name="largest vertical deflection at midspan of the middle span, train at rest",
     )
     table["static_deflection_moving_load"] = Variable(
         dims=(),
         units="m",
-        long_name="vertical deflection at midspan of a simply supported beam under the uniform load",
+        long_name="vertical deflection at midspan of a simply supported beam, uniform load",
     )
     table["passage_speed"] = Variable(dims=(), units="m s-1", long_name="speed of the train")
     table["peak_deflection"] = Variable(
@@ -481,12 +481,10 @@ def provenance(
     inputs
         Files read, by the role they play.
     """
-    from maglev import __version__
-
     attributes: dict[str, str | int] = {
         "Conventions": CONVENTIONS,
         "title": LAYOUTS[layout].title,
-        "source": f"maglev {__version__}",
+        "source": f"maglev {version('maglev')}",
         "references": REFERENCES,
         "axes": AXES,
         "layout": layout,
@@ -545,21 +543,12 @@ def write_netcdf(dataset: xr.Dataset, path: str | Path) -> None:
         if ordered[name].ndim:
             encoding[name] |= {"zlib": True, "complevel": 4, "shuffle": True}
         ordered[name].encoding = {}
-    handle, aside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".part")
-    os.close(handle)
+    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         ordered.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)
-        os.chmod(aside, 0o666 & ~_umask())
         os.replace(aside, path)
-    except BaseException:
-        Path(aside).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    finally:
+        aside.unlink(missing_ok=True)
 
 
 def read(path: str | Path, layout: str) -> xr.Dataset:

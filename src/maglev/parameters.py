@@ -1,14 +1,16 @@
 """What is given: every physical parameter, in SI, with its meaning, source and confidence.
 
 One frozen class per physical thing.  The configuration file writes a quantity with its unit
-(``"24.768 m"``, ``"430 km/h"``); it is converted to SI once, here, and a wrong dimension, an unknown
-key or a value out of range is refused with one sentence that names the key.  The JSON schema of the
-configuration and the parameter tables of the documentation are made from these classes.
+(``"24.768 m"``, ``"430 km/h"``); it is converted to SI once, here, and a wrong dimension, an
+unknown key or a value out of range is refused.  The configuration file, its JSON schema and the
+parameter tables of the documentation are made from these classes.
 """
 
 from __future__ import annotations
 
 import math
+import re
+import tokenize
 from functools import lru_cache
 from typing import Any, Literal
 
@@ -50,7 +52,6 @@ def quantity(
     minimum: float | None = None,
     above: float | None = None,
     below: float | None = None,
-    optional: bool = False,
 ) -> Any:
     """Describe a dimensioned parameter: its SI unit, meaning, default, source and confidence.
 
@@ -68,26 +69,15 @@ def quantity(
         A letter of `CONFIDENCE`.
     minimum, above, below
         Bounds in ``unit``: at least, strictly more than, strictly less than.
-    optional
-        Whether the configuration may say ``null``.
 
     Returns
     -------
     field
         A pydantic field that carries all this for the check, the schema and the tables.
     """
-    if unit:
-        schema_type: dict[str, Any] = {
-            "type": ["string", "null"] if optional else "string",
-            "pattern": r"^\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*\S.*$",
-        }
-    else:
-        schema_type = {}
-    extra = {"unit": unit, "source": source, "confidence": confidence, **schema_type}
+    extra: dict[str, Any] = {"unit": unit, "source": source, "confidence": confidence}
     if isinstance(default, str):
-        extra["default"] = default
-    elif default is not None and unit:
-        extra["default"] = f"{default:.12g} {unit}"
+        extra["written"] = default
     bounds: dict[str, float] = {}
     if minimum is not None:
         bounds["ge"] = minimum
@@ -104,19 +94,35 @@ def quantity(
     )
 
 
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?)\s*"
+    r"(?P<unit>(?![eE][-+]?\d)[^\W\d].*?)\s*"
+)
+_UNREADABLE = (  # what pint raises for a unit that it cannot read
+    pint.errors.PintError,
+    tokenize.TokenError,
+    ArithmeticError,
+    AssertionError,
+    SyntaxError,
+    TypeError,
+    ValueError,
+)
+
+
 def _in_unit(text: str, unit: str, key: str) -> float:
     """Convert a text such as ``"430 km/h"`` to a number in ``unit``."""
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise ValueError(
+            f"{key} must be a number with a unit of {unit}, such as '1.5 {unit}', got {text!r}"
+        )
     try:
-        value = _units().Quantity(text)
-    except (pint.errors.PintError, AssertionError, ValueError, TypeError, SyntaxError) as error:
+        value = _units().Quantity(float(match["number"]), match["unit"])
+    except _UNREADABLE as error:
         raise ValueError(
-            f"{key} must be a number with a unit of {unit}, got {text!r}, which cannot be read"
+            f"{key} must be a number with a unit of {unit}, got {text!r}, whose unit is not known"
         ) from error
-    except Exception as error:  # pint lets its tokenizer's own errors through
-        raise ValueError(
-            f"{key} must be a number with a unit of {unit}, got {text!r}, which cannot be read"
-        ) from error
-    if not isinstance(value, pint.Quantity) or not value.is_compatible_with(unit):
+    if not value.is_compatible_with(unit):
         raise ValueError(
             f"{key} must be given in {unit} or a unit that converts to it, got {text!r}"
         )
@@ -144,10 +150,10 @@ class Parameters(BaseModel):
                 raise ValueError(f"{name} must be a number, got {value}")
             if unit and isinstance(value, str):
                 converted[name] = _in_unit(value, unit, name)
+            elif unit and isinstance(value, int | float):
+                raise ValueError(f"{name} must carry its unit, such as '{value} {unit}'")
             elif unit:
-                raise ValueError(
-                    f"{name} must carry its unit, such as '{value} {unit}', got {value!r}"
-                )
+                raise ValueError(f"{name} must be a number with a unit of {unit}, got {value!r}")
         return converted
 
     def quantities(self) -> dict[str, Any]:
@@ -324,18 +330,19 @@ class Magnet(Parameters):
         None,
         source="A",
         confidence="L",
-        optional=True,
     )  # type: ignore[arg-type]
 
     @model_validator(mode="after")
     def _check(self) -> Magnet:
         if self.n_poles % self.poles_per_controller:
             raise ValueError(
-                f"poles_per_controller must divide n_poles = {self.n_poles}, got {self.poles_per_controller}"
+                f"poles_per_controller must divide n_poles = {self.n_poles}, "
+                f"got {self.poles_per_controller}"
             )
         if not self.current_max > self.current_reference:
             raise ValueError(
-                f"current_max must exceed current_reference = {self.current_reference} A, got {self.current_max} A"
+                f"current_max must exceed current_reference = {self.current_reference:g} A, "
+                f"got {self.current_max:g} A"
             )
         return self
 
@@ -377,7 +384,8 @@ class Train(Parameters):
         expected = 8 * self.bogie.c_frame_spacing
         if not math.isclose(self.car_pitch, expected, rel_tol=1e-9):
             raise ValueError(
-                f"car_pitch must be eight C-frame spacings = {expected:g} m, got {self.car_pitch:g} m"
+                f"car_pitch must be eight C-frame spacings = {expected:g} m, "
+                f"got {self.car_pitch:g} m"
             )
         return self
 
@@ -442,7 +450,7 @@ class BeamSection(Parameters):
 
 
 class Rail(Parameters):
-    """The functional units of one side: steel beams with free ends on rigid arms from the girder."""
+    """The functional units of one side: steel beams, ends free, on rigid arms from the girder."""
 
     section: BeamSection = BeamSection(
         elastic_modulus="2.06e11 Pa",
@@ -481,7 +489,7 @@ class Rail(Parameters):
     )
     connector_mass: float = quantity(
         "kg/m",
-        "connectors' mass per length of one rail: girder, rails and connectors weigh 7000 kg/m together",
+        "connectors' mass per length of one rail: girder, rails and connectors weigh 7000 kg/m",
         146.8,
         source="D",
         confidence="M",
@@ -489,7 +497,8 @@ class Rail(Parameters):
     )
     connector_longitudinal: Literal["sliding", "rigid"] = Field(
         "sliding",
-        description="whether a connector carries force along the rail; sliding: only the first of each unit does",
+        description="whether a connector carries force along the rail; "
+        "sliding: only the first of each unit does",
         json_schema_extra={"source": "A", "confidence": "L"},
     )
 
@@ -555,7 +564,8 @@ class Pier(Parameters):
     def _check(self) -> Pier:
         if not self.cap_height < self.height:
             raise ValueError(
-                f"cap_height must be less than height = {self.height:g} m, got {self.cap_height:g} m"
+                f"cap_height must be less than height = {self.height:g} m, "
+                f"got {self.cap_height:g} m"
             )
         return self
 
@@ -615,7 +625,7 @@ class PowerLaw(Parameters):
 
 
 class RationalLaw(Parameters):
-    """S(n) = Σ a_j n^j / Σ b_j n^j, one-sided, coefficients in rising order, S in m³ for n in 1/m."""
+    """S(n) = Σ a_j n^j / Σ b_j n^j, one-sided, rising order, S in m³ for n in 1/m."""
 
     law: Literal["rational"]
     numerator: tuple[float, ...] = Field(description="a_j in rising order [SI]", min_length=1)
@@ -671,14 +681,17 @@ class Irregularity(Parameters):
     )
     profile_file: str | None = Field(
         None,
-        description="measured profile (CSV or NetCDF with x, vertical, lateral [m]) instead of the spectra; path relative to the configuration file",
+        description="measured profile (CSV or NetCDF with x, vertical, lateral [m]) instead of "
+        "the spectra; path relative to the configuration file",
+        json_schema_extra={"file": True},
     )
 
     @model_validator(mode="after")
     def _check(self) -> Irregularity:
         if not self.wavelength_min < self.wavelength_max:
             raise ValueError(
-                f"wavelength_min must be less than wavelength_max = {self.wavelength_max:g} m, got {self.wavelength_min:g} m"
+                f"wavelength_min must be less than wavelength_max = {self.wavelength_max:g} m, "
+                f"got {self.wavelength_min:g} m"
             )
         return self
 
@@ -740,7 +753,6 @@ class Passage(Parameters):
         source="A",
         confidence="M",
         above=0,
-        optional=True,
     )
     gap_contact: float = quantity(
         "m", "gap at which magnet and rail touch", "0.5 mm", source="A", confidence="M", above=0
@@ -753,7 +765,8 @@ class Passage(Parameters):
     def _check(self) -> Passage:
         if not self.gap_contact < self.gap_lost:
             raise ValueError(
-                f"gap_contact must be less than gap_lost = {self.gap_lost:g} m, got {self.gap_contact:g} m"
+                f"gap_contact must be less than gap_lost = {self.gap_lost:g} m, "
+                f"got {self.gap_contact:g} m"
             )
         return self
 
@@ -773,12 +786,16 @@ class Validation(Parameters):
     measurements: str = Field(
         "measurements/shanghai.yaml",
         description="measured values; path relative to the configuration file",
+        json_schema_extra={"file": True},
     )
 
     @model_validator(mode="after")
     def _check(self) -> Validation:
         if not self.speed_min <= self.speed_max:
-            raise ValueError("speed_min must not exceed speed_max")
+            raise ValueError(
+                f"speed_min must not exceed speed_max = {self.speed_max:g} m/s, "
+                f"got {self.speed_min:g} m/s"
+            )
         return self
 
 
@@ -808,12 +825,12 @@ class Config(Parameters):
             if not self.passage.gap_contact < magnet.gap_reference < self.passage.gap_lost:
                 raise ValueError(
                     f"train.{kind}_magnet.gap_reference must lie between passage.gap_contact = "
-                    f"{self.passage.gap_contact:g} m and passage.gap_lost = {self.passage.gap_lost:g} m, "
-                    f"got {magnet.gap_reference:g} m"
+                    f"{self.passage.gap_contact:g} m and passage.gap_lost = "
+                    f"{self.passage.gap_lost:g} m, got {magnet.gap_reference:g} m"
                 )
         if self.irregularity.fade_in > self.passage.approach:
             raise ValueError(
-                f"irregularity.fade_in must not exceed passage.approach = {self.passage.approach:g} m, "
-                f"got {self.irregularity.fade_in:g} m"
+                f"irregularity.fade_in must not exceed passage.approach = "
+                f"{self.passage.approach:g} m, got {self.irregularity.fade_in:g} m"
             )
         return self

@@ -1,0 +1,291 @@
+"""From configuration files to parameters: read, overlay, check, with one sentence for a mistake.
+
+A configuration file says only what differs from the defaults, or from the file that its key
+``extends`` names.  Later files overlay earlier ones, key by key.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import UnionType
+from typing import Any, get_args
+
+import yaml
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from maglev.parameters import Config, Parameters
+
+
+class ConfigError(ValueError):
+    """A mistake in a configuration, told in one sentence that names the key or the file."""
+
+
+class _UniqueKeys(yaml.SafeLoader):
+    """A safe loader that refuses a key given twice, of which YAML would keep the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    problem=f"the key '{key}' stands twice", problem_mark=key_node.start_mark
+                )
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def read_yaml(path: str | Path) -> dict[str, Any]:
+    """Read a YAML file whose top level is a mapping.
+
+    Raises
+    ------
+    ConfigError
+        If there is no such file, or it is not YAML, or a key stands twice, or its top level is
+        something else.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path} cannot be read: {(error.strerror or '').lower()}") from error
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path} is not a text file in UTF-8") from error
+    try:
+        mapping = yaml.load(text, Loader=_UniqueKeys)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f", line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        raise ConfigError(f"{path}{where}: {error.problem}") from error
+    except yaml.YAMLError as error:
+        raise ConfigError(f"{path} is not YAML: {' '.join(str(error).split())}") from error
+    if mapping is None:
+        return {}
+    if not isinstance(mapping, dict):
+        raise ConfigError(f"{path} must hold keys and values, got {_shown(mapping)}")
+    return mapping
+
+
+def overlay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Lay one nested mapping over another, key by key; neither is changed.
+
+    A spectrum of another law replaces the one below it as a whole.
+    """
+    merged = dict(base)
+    for key, value in over.items():
+        below = merged.get(key)
+        if isinstance(below, Mapping) and isinstance(value, Mapping):
+            same_law = value.get("law", below.get("law")) == below.get("law")
+            merged[key] = overlay(below, value) if same_law else dict(value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _file_keys(model: type[Parameters], path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Yield the path of every key that names a file."""
+    for name, field in model.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Parameters):
+            yield from _file_keys(field.annotation, (*path, name))
+        elif isinstance(field.json_schema_extra, dict) and field.json_schema_extra.get("file"):
+            yield (*path, name)
+
+
+def _named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
+    """Yield the path of every key of the mapping that names a file, and the name."""
+    for path in _file_keys(Config):
+        value: Any = mapping
+        for part in path:
+            value = value.get(part) if isinstance(value, Mapping) else None
+        if isinstance(value, str):
+            yield path, value
+
+
+def rebase(mapping: Mapping[str, Any], *, old: str | Path, new: str | Path) -> dict[str, Any]:
+    """Rewrite file names that are relative to the directory ``old`` as relative to ``new``."""
+    rebased = dict(mapping)
+    for path, name in _named_files(mapping):
+        nested: Any = name if os.path.isabs(name) else os.path.relpath(os.path.join(old, name), new)
+        for part in reversed(path):
+            nested = {part: nested}
+        rebased = overlay(rebased, nested)
+    return rebased
+
+
+def read_overlays(path: str | Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """Read a configuration file laid over the files it extends.
+
+    File names in it become relative to the current directory.
+
+    Raises
+    ------
+    ConfigError
+        As `read_yaml` does, or if files extend each other in a circle.
+    """
+    path = Path(path)
+    if path.resolve() in above:
+        raise ConfigError(f"{path} extends itself")
+    mapping = rebase(read_yaml(path), old=path.parent, new=".")
+    base = mapping.pop("extends", None)
+    if base is None:
+        return mapping
+    if not isinstance(base, str):
+        raise ConfigError(f"extends must be the name of a file, got {_shown(base)}")
+    return overlay(read_overlays(path.parent / base, (*above, path.resolve())), mapping)
+
+
+def from_mapping(mapping: Mapping[str, Any]) -> Config:
+    """Build the parameters from nested keys and values, laid over the defaults.
+
+    Parameters
+    ----------
+    mapping
+        As a configuration file holds it; names of files are relative to the current directory.
+
+    Raises
+    ------
+    ConfigError
+        If a key is unknown, a value is of the wrong kind, unit or range, values do not fit each
+        other, or a file that is named does not exist.
+    """
+    config: Config = validated(Config, overlay(Config().quantities(), mapping))
+    for path, name in _named_files(mapping):
+        if not Path(name).is_file():
+            raise ConfigError(f"{'.'.join(path)} names a file that does not exist: {name}")
+    return config
+
+
+def validated(model: type[Any], mapping: Mapping[str, Any]) -> Any:
+    """Build a parameter class; the first mistake becomes a `ConfigError` of one sentence."""
+    try:
+        return model.model_validate(mapping)
+    except ValidationError as error:
+        raise ConfigError(_sentence(model, mapping, error.errors()[0])) from error
+
+
+def load_config(*paths: str | Path) -> Config:
+    """Read a configuration: the defaults, and each file in turn laid over them.
+
+    Parameters
+    ----------
+    paths
+        YAML files; later ones overlay earlier ones.  A file may itself name one that it
+        ``extends``.  None at all gives the defaults.
+
+    Returns
+    -------
+    config
+        All parameters, in SI.  Names of files are relative to the current directory.
+
+    Raises
+    ------
+    ConfigError
+        If a file cannot be read, a key is unknown, a value is of the wrong kind, unit or range,
+        values do not fit each other, or a file that is named does not exist.
+    """
+    mapping: dict[str, Any] = {}
+    for path in paths:
+        mapping = overlay(mapping, read_overlays(path))
+    return from_mapping(mapping)
+
+
+def write_config(config: Config, path: str | Path) -> None:
+    """Write every value with its unit, so that `load_config` of the file gives the same again."""
+    path = Path(path)
+    mapping = rebase(config.quantities(), old=".", new=path.parent)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(yaml.safe_dump(mapping, sort_keys=False, allow_unicode=True), encoding="utf-8")
+
+
+def _shown(value: Any) -> str:
+    """A value as the file would write it, cut short."""
+    text = value if isinstance(value, str) else yaml.safe_dump(value, default_flow_style=True)
+    text = " ".join(text.removesuffix("...\n").split())
+    text = text if len(text) <= 60 else f"{text[:57]}..."
+    return f"'{text}'" if isinstance(value, str) else text
+
+
+def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, list[str]]:
+    """Return the dotted place in the file, without the tags of unions, and the keys known there."""
+    place: list[str] = []
+    candidates: tuple[Any, ...] = (model,)
+    for part in loc:
+        tagged = [
+            c
+            for c in candidates
+            if "law" in c.model_fields and part in get_args(c.model_fields["law"].annotation)
+        ]
+        if tagged:
+            candidates = tuple(tagged)
+            continue
+        place.append(str(part))
+        fields = [c.model_fields[part] for c in candidates if part in c.model_fields]
+        annotation = fields[0].annotation if fields else None
+        members = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
+        candidates = tuple(m for m in members if isinstance(m, type) and issubclass(m, Parameters))
+    return ".".join(place), [name for c in candidates for name in c.model_fields]
+
+
+def _unit_of(model: type[Parameters], place: str) -> str:
+    """Unit of the quantity at a dotted place, with a space before it; empty if it has none."""
+    *outer, last = place.split(".")
+    for name in outer:
+        annotation = model.model_fields[name].annotation if name in model.model_fields else None
+        if not (isinstance(annotation, type) and issubclass(annotation, Parameters)):
+            return ""
+        model = annotation
+    extra = model.model_fields[last].json_schema_extra if last in model.model_fields else None
+    unit = extra.get("unit") if isinstance(extra, dict) else None
+    return f" {unit}" if unit else ""
+
+
+_PHRASES = {
+    "greater_than": "must be greater than {gt:g}{unit}",
+    "greater_than_equal": "must be at least {ge:g}{unit}",
+    "less_than": "must be less than {lt:g}{unit}",
+    "less_than_equal": "must be at most {le:g}{unit}",
+    "finite_number": "must be finite",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "string_type": "must be text",
+    "string_pattern_mismatch": "must match {pattern}",
+    "literal_error": "must be {expected}",
+    "union_tag_invalid": "must have a law among {expected_tags}",
+    "tuple_type": "must be a list",
+    "model_type": "must hold keys and values",
+    "model_attributes_type": "must hold keys and values",
+    "dict_type": "must hold keys and values",
+    "too_short": "must have at least {min_length} values",
+}
+"""What each kind of finding of pydantic says here, with the names of its own context."""
+
+
+def _sentence(model: type[Parameters], mapping: Mapping[str, Any], error: ErrorDetails) -> str:
+    """Say one finding of pydantic as a sentence with the dotted key and the value as written."""
+    kind, loc, context = error["type"], error["loc"], error.get("ctx", {})
+    place, known = _keys_of(model, loc)
+    if kind == "value_error":  # our own words, which begin with the key inside its section
+        return f"{place}.{context['error']}" if place else str(context["error"])
+    if kind == "missing":
+        return f"{place} is missing"
+    if kind == "extra_forbidden":
+        section, _, key = place.rpartition(".")
+        _, known = _keys_of(model, loc[:-1])
+        near = difflib.get_close_matches(key, known, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(known)}"
+        return f"{place} is not a known key{f' of {section}' if section else ''}; {hint}"
+    value: Any = mapping
+    for part in place.split("."):
+        value = value.get(part) if isinstance(value, Mapping) else error["input"]
+    phrase = _PHRASES.get(kind)
+    if phrase is None:
+        return f"{place}: {error['msg']}, got {_shown(value)}"
+    return f"{place} {phrase.format(unit=_unit_of(model, place), **context)}, got {_shown(value)}"
