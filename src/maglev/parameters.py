@@ -364,19 +364,28 @@ class Train(Parameters):
     rod: Rod = Rod()
     air_spring: AirSpring = AirSpring()
     suspension_magnet: Magnet = Magnet()
-    guidance_magnet: Magnet = Magnet(
-        mass="390 kg",
-        inertia="310 kg m^2",
-        y="1.465 m",
-        z="-0.18 m",
-        end_stiffness="5e6 N/m",
-        end_damping="1e4 N s/m",
-        n_poles=3,
-        pole_pitch="1.032 m",
-        poles_per_controller=3,
-        gap_reference="10 mm",
-        current_reference="25 A",
-        preload="10 kN",
+    guidance_magnet: Magnet = Field(
+        Magnet(
+            mass="390 kg",
+            inertia="310 kg m^2",
+            y="1.465 m",
+            z="-0.18 m",
+            end_stiffness="5e6 N/m",
+            end_damping="1e4 N s/m",
+            n_poles=3,
+            pole_pitch="1.032 m",
+            poles_per_controller=3,
+            gap_reference="10 mm",
+            current_reference="25 A",
+            preload="10 kN",
+        ),
+        json_schema_extra={
+            "origins": {
+                "z": ["H", "M"],
+                "gap_reference": ["A", "L"],
+                "current_reference": ["A", "L"],
+            }
+        },
     )  # type: ignore[arg-type]
 
     @model_validator(mode="after")
@@ -452,17 +461,30 @@ class BeamSection(Parameters):
 class Rail(Parameters):
     """The functional units of one side: steel beams, ends free, on rigid arms from the girder."""
 
-    section: BeamSection = BeamSection(
-        elastic_modulus="2.06e11 Pa",
-        poisson_ratio=0.3,
-        density="7850 kg/m^3",
-        area="0.045 m^2",
-        second_moment_vertical="5e-4 m^4",
-        second_moment_lateral="1e-3 m^4",
-        torsion_constant="1e-3 m^4",
-        polar_inertia="11.775 kg m",
-        shear_coefficient_vertical=0.4,
-        shear_coefficient_lateral=0.4,
+    section: BeamSection = Field(
+        BeamSection(
+            elastic_modulus="2.06e11 Pa",
+            poisson_ratio=0.3,
+            density="7850 kg/m^3",
+            area="0.045 m^2",
+            second_moment_vertical="5e-4 m^4",
+            second_moment_lateral="1e-3 m^4",
+            torsion_constant="1e-3 m^4",
+            polar_inertia="11.775 kg m",
+            shear_coefficient_vertical=0.4,
+            shear_coefficient_lateral=0.4,
+        ),
+        json_schema_extra={
+            "origins": {
+                name: ["A", "L"]
+                for name in (
+                    "area",
+                    "second_moment_vertical",
+                    "second_moment_lateral",
+                    "torsion_constant",
+                )
+            }
+        },
     )  # type: ignore[arg-type]
     units_per_span: int = Field(
         8,
@@ -609,7 +631,7 @@ class Guideway(Parameters):
 class PowerLaw(Parameters):
     """S(n) = coefficient · n^(-exponent), one-sided, n = 1/λ in 1/m, S in m³."""
 
-    law: Literal["power"] = "power"
+    law: Literal["power"] = Field("power", description="a power of the wavenumber")
     coefficient: float = Field(
         2.3e-8,
         description="S at n = 1/m [SI: m³ (1/m)^exponent]",
@@ -627,7 +649,7 @@ class PowerLaw(Parameters):
 class RationalLaw(Parameters):
     """S(n) = Σ a_j n^j / Σ b_j n^j, one-sided, rising order, S in m³ for n in 1/m."""
 
-    law: Literal["rational"]
+    law: Literal["rational"] = Field(description="a ratio of two polynomials")
     numerator: tuple[float, ...] = Field(description="a_j in rising order [SI]", min_length=1)
     denominator: tuple[float, ...] = Field(description="b_j in rising order [SI]", min_length=1)
 
@@ -635,7 +657,7 @@ class RationalLaw(Parameters):
 class GermanLaw(Parameters):
     """German railway spectrum S(Ω) = A Ω_c² / ((Ω² + Ω_r²)(Ω² + Ω_c²)), Ω = 2πn; S(n) = 2π S(Ω)."""
 
-    law: Literal["german"]
+    law: Literal["german"] = Field(description="the German railway form")
     roughness: float = quantity("m^2 rad/m", "A", 4.032e-7, source="A", confidence="M", above=0)
     corner_c: float = quantity("rad/m", "Ω_c", 0.8246, source="A", confidence="M", above=0)
     corner_r: float = quantity("rad/m", "Ω_r", 0.0206, source="A", confidence="M", above=0)

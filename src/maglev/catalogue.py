@@ -1,0 +1,278 @@
+"""What the parameter and variable tables look like from outside: config file, schema, documents.
+
+Everything here is made from `maglev.parameters` and `maglev.datasets`; the files in the repository
+are written by ``maglev describe`` and a test compares them.
+"""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator
+from types import UnionType
+from typing import Any, get_args
+
+import yaml
+from pydantic import TypeAdapter
+from pydantic.fields import FieldInfo
+
+from maglev.datasets import CONVENTIONS, LAYOUTS, VARIABLES, Variable
+from maglev.parameters import CONFIDENCE, SOURCES, Config, Parameters
+
+LINE = 100
+
+_BY_COMMAND = "Written by `maglev describe {what}`; edit the classes in src/maglev, not this file."
+
+
+def _number(value: float) -> str:
+    """The shortest decimal that reads back as the same number, such as ``1e7`` or ``39000``."""
+    text = f"{value:.6g}"
+    text = text if float(text) == value else repr(value)
+    return re.sub(r"e\+?(-?)0*(\d)", r"e\1\2", text)
+
+
+def _written(field: FieldInfo, value: Any) -> Any:
+    """The value as a file would state it: with its unit, in the unit the default is stated in."""
+    extra = _extra(field)
+    if value is None or not extra.get("unit"):
+        return list(value) if isinstance(value, tuple) else value
+    if "written" in extra and value == field.default:
+        return extra["written"]
+    return f"{_number(value)} {extra['unit']}"
+
+
+def _sections(field: FieldInfo) -> tuple[type[Parameters], ...]:
+    """The parameter classes that may stand in a field, none for a plain value."""
+    annotation = field.annotation
+    members = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
+    return tuple(m for m in members if isinstance(m, type) and issubclass(m, Parameters))
+
+
+def _extra(field: FieldInfo) -> dict[str, Any]:
+    return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+
+
+def _origins(field: FieldInfo) -> dict[str, tuple[str, str]]:
+    """Source and confidence that a section's field states for single values of its own default."""
+    return _extra(field).get("origins", {})
+
+
+def _tag(origin: tuple[str, str] | None) -> str:
+    """Source and confidence, such as ``[P; high]``; empty for a setting without a source."""
+    return f"[{origin[0]}; {CONFIDENCE[origin[1]]}]" if origin else ""
+
+
+def _origin(name: str, field: FieldInfo, origins: dict[str, tuple[str, str]]) -> Any:
+    extra = _extra(field)
+    return origins.get(name, (extra["source"], extra["confidence"]) if "source" in extra else None)
+
+
+def _summary(model: type[Parameters]) -> str:
+    return (model.__doc__ or "").strip().splitlines()[0]
+
+
+def _yaml_value(value: Any) -> str:
+    text = yaml.safe_dump(value, default_flow_style=True, allow_unicode=True, width=10_000)
+    text = text.removesuffix("\n").removesuffix("\n...")
+    return text[1:-1] if re.fullmatch(r"'[-+0-9.e]+ [^':#]+'", text) else text
+
+
+def _commented(line: str, comment: str, pad: str) -> list[str]:
+    """A line with its comment behind it, or above it where the line would become too long."""
+    if not comment:
+        return [line]
+    if len(line) + len(comment) + 4 <= LINE:
+        return [f"{line}  # {comment}"]
+    above = {"initial_indent": f"{pad}# ", "subsequent_indent": f"{pad}#   "}
+    return [*textwrap.wrap(comment, LINE, **above), line]
+
+
+def _config_lines(
+    parameters: Parameters, origins: dict[str, tuple[str, str]], indent: int = 0
+) -> Iterator[str]:
+    pad = "  " * indent
+    for name, field in type(parameters).model_fields.items():
+        value = getattr(parameters, name)
+        if isinstance(value, Parameters):
+            if indent == 0:
+                yield ""
+            yield from _commented(f"{pad}{name}:", _summary(type(value)), pad)
+            yield from _config_lines(value, _origins(field), indent + 1)
+        else:
+            words = (_tag(_origin(name, field, origins)), field.description)
+            line = f"{pad}{name}: {_yaml_value(_written(field, value))}"
+            yield from _commented(line, " ".join(filter(None, words)), pad)
+
+
+def default_config() -> str:
+    """The configuration file with every default, its unit, source, confidence and meaning."""
+    letters = [
+        line
+        for letter, meaning in SOURCES.items()
+        for line in textwrap.wrap(f"#   {letter}: {meaning}", LINE, subsequent_indent="#      ")
+    ]
+    head = [
+        "# Everything the results are made of: replace a value by a better one and run again.",
+        "# A quantity carries its unit; any unit that converts will do.  A key left out keeps its",
+        "# default, which is the value written here.",
+        f"# {_BY_COMMAND.format(what='config')}",
+        "#",
+        "# [source; confidence] of each value:",
+        *letters,
+        "",
+    ]
+    return "\n".join([*head, *_config_lines(Config(), {})]) + "\n"
+
+
+def _field_schema(field: FieldInfo, value: Any, origin: Any) -> dict[str, Any]:
+    described = {"description": " ".join(filter(None, (field.description, _tag(origin))))}
+    if _extra(field).get("unit"):
+        optional = type(None) in get_args(field.annotation)
+        return {
+            **described,
+            "type": ["string", "null"] if optional else "string",
+            "pattern": r"^\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\s*\S",
+            "default": _written(field, value),
+        }
+    plain = TypeAdapter(field.rebuild_annotation()).json_schema()
+    if "anyOf" in plain:
+        plain = {"type": [member["type"] for member in plain["anyOf"]]}
+    return {**described, **plain, "default": _written(field, value)}
+
+
+def _object_schema(
+    model: type[Parameters],
+    parameters: Parameters | None,
+    origins: dict[str, tuple[str, str]],
+) -> dict[str, Any]:
+    properties: dict[str, Any] = {}
+    for name, field in model.model_fields.items():
+        value = field.default if parameters is None else getattr(parameters, name)
+        sections = _sections(field)
+        if len(sections) == 1:
+            properties[name] = _object_schema(sections[0], value, _origins(field))
+        elif sections:
+            properties[name] = {
+                "description": field.description,
+                "oneOf": [
+                    _object_schema(section, value if isinstance(value, section) else None, {})
+                    for section in sections
+                ],
+                "default": value.quantities(),
+            }
+        else:
+            properties[name] = _field_schema(field, value, _origin(name, field, origins))
+            if field.is_required():
+                del properties[name]["default"]
+    required = [name for name, field in model.model_fields.items() if field.is_required()]
+    return {
+        "type": "object",
+        "description": _summary(model),
+        "additionalProperties": False,
+        **({"required": required} if required else {}),
+        "properties": properties,
+    }
+
+
+def schema() -> str:
+    """The JSON schema of the configuration, as YAML."""
+    whole = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Configuration of maglev",
+        **_object_schema(Config, Config(), {}),
+    }
+    whole["properties"]["extends"] = {
+        "type": "string",
+        "description": "configuration file that this one is laid over, relative to this one",
+    }
+    text = yaml.safe_dump(whole, sort_keys=False, allow_unicode=True, width=LINE)
+    return f"# {_BY_COMMAND.format(what='schema')}\n{text}"
+
+
+def _parameter_rows(
+    parameters: Parameters, origins: dict[str, tuple[str, str]], path: str
+) -> Iterator[str]:
+    nested = []
+    rows = []
+    for name, field in type(parameters).model_fields.items():
+        value = getattr(parameters, name)
+        if isinstance(value, Parameters):
+            nested.append((f"{path}.{name}" if path else name, value, _origins(field)))
+            continue
+        source, confidence = _origin(name, field, origins) or ("", "")
+        shown = _yaml_value(_written(field, value))
+        rows.append(
+            f"| `{name}` | {shown} | {field.description or ''} | "
+            f"{source} | {CONFIDENCE.get(confidence, '')} |"
+        )
+    yield f"## {f'`{path}`' if path else 'Top level'}"
+    yield ""
+    yield _summary(type(parameters))
+    yield ""
+    if rows:
+        yield "| key | default | meaning | source | confidence |"
+        yield "| --- | --- | --- | --- | --- |"
+        yield from rows
+        yield ""
+    for inner, value, inner_origins in nested:
+        yield from _parameter_rows(value, inner_origins, inner)
+
+
+def parameter_tables() -> str:
+    """The document of all parameters, one table a section."""
+    lines = [
+        "# Parameters",
+        "",
+        f"<!-- {_BY_COMMAND.format(what='parameters')} -->",
+        "",
+        "Every key of the configuration, with its default, its meaning, and how far it can be "
+        "trusted. Sources:",
+        "",
+        *(f"- **{letter}**: {meaning}" for letter, meaning in SOURCES.items()),
+        "",
+        *_parameter_rows(Config(), {}, ""),
+    ]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _variable_row(name: str, variable: Variable) -> str:
+    meaning = variable.long_name
+    if variable.flags is not None:
+        meaning += ": " + ", ".join(f"{key} {word}" for key, word in variable.flags.items())
+    dims = ", ".join(variable.dims) or "(none)"
+    unit = "" if variable.flags is not None else variable.units
+    return f"| `{name}` | {dims} | {unit} | {meaning} | {variable.dtype} |"
+
+
+def dataset_tables() -> str:
+    """The document of all files, one table a layout."""
+    lines = [
+        "# Files",
+        "",
+        f"<!-- {_BY_COMMAND.format(what='datasets')} -->",
+        "",
+        f"NetCDF-4 files under the {CONVENTIONS} conventions. Each carries as global attributes "
+        "its title, source with version, references, the part of the configuration it depends on "
+        "(`config`, JSON with units), the fingerprint of the code (`code`), the seed where "
+        "something is random, and the hashes of the files it was made from (`input_…`). Axes: x "
+        "along travel, y to the right, z down.",
+        "",
+    ]
+    header = [
+        "| variable | dimensions | unit | meaning | type |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    used: set[str] = set()
+    for name, layout in LAYOUTS.items():
+        lines += [f"## `{name}`", "", layout.title + ".", "", *header]
+        for variable in (*layout.variables, *layout.optional):
+            row = _variable_row(variable, VARIABLES[variable])
+            if variable in layout.optional:
+                row = row.replace("` |", "` (if asked) |", 1)
+            lines.append(row)
+            used.update((variable, *VARIABLES[variable].dims))
+        lines.append("")
+    coordinates = [name for name in VARIABLES if VARIABLES[name].dims == (name,)]
+    lines += ["## Coordinates", "", *header]
+    lines += [_variable_row(name, VARIABLES[name]) for name in coordinates if name in used]
+    return "\n".join(lines).rstrip() + "\n"
