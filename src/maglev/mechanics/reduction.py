@@ -98,9 +98,7 @@ def spline_weights(u: Array) -> Array:
     de Boor, A Practical Guide to Splines (2001), ch. X.
     """
     v = 1.0 - u
-    return (
-        np.stack([v**3, 3 * u**3 - 6 * u**2 + 4, 3 * v**3 - 6 * v**2 + 4, u**3], axis=-1) / 6.0
-    )
+    return np.stack([v**3, 3 * u**3 - 6 * u**2 + 4, 3 * v**3 - 6 * v**2 + 4, u**3], axis=-1) / 6.0
 
 
 def reduce(model: full.GuidewayModel, cutoff: float) -> ReducedGuideway:
@@ -283,9 +281,7 @@ def _places(
     return places
 
 
-def _exact_damping(
-    model: full.GuidewayModel, basis: sp.csr_matrix, cutoff: float
-) -> sp.csr_matrix:
+def _exact_damping(model: full.GuidewayModel, basis: sp.csr_matrix, cutoff: float) -> sp.csr_matrix:
     """A set share of critical in every mode up to the cut-off, its absolute rate beyond."""
     mass = (basis.T @ model.mass @ basis).toarray()
     stiffness = (basis.T @ model.stiffness @ basis).toarray()
@@ -313,7 +309,7 @@ def _rail_splines(
     fit = np.linalg.pinv(design)
     sides = []
     for side in (1, -1):
-        rows = model.rail_rows(x, np.full(x.size, side))
+        rows = model.rail_rows(x, side)
         sides.append([(rows[k] @ basis[:, columns]).toarray() for k in (0, 2)])
     (right_z, right_y), (left_z, left_y) = sides
     z, roll, y = (right_z + left_z) / 2, (right_z - left_z) / 2, (right_y + left_y) / 2

@@ -1,0 +1,521 @@
+"""Compiled: the passage of a row of samples, step by step.
+
+Kernels take arrays and floats, write where they are told and check nothing: `integrate` has
+checked.  All samples of a row share the train's place, the track and the matrices; only the gains
+differ.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from maglev.mechanics.lanes import LANES, choose, fma, load, maximum, minimum, store
+
+COMPLETED, CONTACT, GAP_LOST, NOT_FINITE = 0, 1, 2, 3
+"""How a passage ended: the values of ``status`` [-]."""
+
+
+class Vehicle(NamedTuple):
+    """Train with open magnets; links in rows of non-zero coefficients."""
+
+    inverse_mass: np.ndarray  # (dof,)
+    link_start: np.ndarray  # (link + 1,)
+    link_dof: np.ndarray  # (non-zero,)
+    link_coefficient: np.ndarray  # (non-zero,)
+    link_stiffness: np.ndarray  # (link,)
+    link_damping: np.ndarray  # (link,)
+    body_z: np.ndarray  # (car,) degree of freedom
+    body_y: np.ndarray  # (car,)
+
+
+class MagnetRows(NamedTuple):
+    """Magnets of one kind, right and left at the same place."""
+
+    x: np.ndarray  # (row,) centre relative to the nose [m]
+    number: np.ndarray  # (row, side) place in the train's table of magnets
+    translation: np.ndarray  # (row, side) degree of freedom
+    rotation: np.ndarray  # (row, side)
+    static_force: np.ndarray  # (row, side) [N]
+    static_moment: np.ndarray  # (row, side) [N m]
+    constant: np.ndarray  # (row, side, pole) K of F = K (i/gap)^2 [N m^2/A^2]
+    offset: np.ndarray  # (pole,) ahead of the centre [m]
+    arm: np.ndarray  # (pole,) displacement of the pole per rotation [m]
+    outward: np.ndarray  # (side,) sign of the displacement that opens the gap
+    gap_reference: float  # [m]
+    current_reference: float  # [A]
+    current_max: float  # [A]
+    is_guidance: bool
+
+
+class Line(NamedTuple):
+    """Guideway in component coordinates."""
+
+    n_spans: int
+    span_length: float
+    intervals: int  # splines' intervals a span
+    stride: int  # rows of spline coefficients a span, at least intervals + 3, a multiple of 4
+    vertical: np.ndarray  # (span, column) coordinates that move the rails' mean up and down
+    lateral: np.ndarray  # (span, column) coordinates that roll the span or move it sideways
+    rail_z: np.ndarray  # (stride, vertical column)
+    rail_roll: np.ndarray  # (stride, lateral column)
+    rail_y: np.ndarray  # (stride, lateral column)
+    n_modes: int
+    row_start: np.ndarray  # (coordinate + 1,) stiffness and damping, same pattern
+    column: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    top_factor: np.ndarray  # (top, band) Cholesky rows of the pier tops' mass, diagonal inverted
+    output_column: np.ndarray  # (output column,) coordinates that move midspan
+    midspan: np.ndarray  # (2, output column) z and y
+
+
+class Track(NamedTuple):
+    """Irregularity on a uniform grid, by cubic Hermite interpolation."""
+
+    start: float
+    spacing: float
+    value: np.ndarray  # (kind * 2 + side, grid) [m]
+    slope: np.ndarray  # (kind * 2 + side, grid) [-]
+
+
+class Run(NamedTuple):
+    """One passage and how it is watched."""
+
+    n_steps: int
+    time_step: float
+    speed: float
+    start: float  # place of the nose at time zero [m]
+    train_length: float
+    gap_contact: float
+    gap_lost: float
+    filter_b: np.ndarray  # (3,)
+    filter_a: np.ndarray  # (3,)
+    record_every: int  # steps between recorded rows; zero: none
+
+
+class Outcome(NamedTuple):
+    """What one row of samples leaves behind."""
+
+    extreme: np.ndarray  # (4 + 2 car, LANES) girder z, y, acceleration z, y; bodies' z; bodies' y
+    extreme_time: np.ndarray  # same
+    gap_min: np.ndarray  # (kind, LANES)
+    gap_max: np.ndarray
+    current_max: np.ndarray
+    status: np.ndarray  # (LANES,) int64
+    lost_time: np.ndarray  # (LANES,)
+    lost_magnet: np.ndarray  # (LANES,) int64
+    history: np.ndarray  # (record, 4 + 2 car + 2 magnet, LANES)
+
+
+@njit(cache=True, error_model="numpy")
+def _transform(matrix, columns, source, first, target):
+    """``target[first + k] = Σ_m matrix[k, m] source[columns[m]]``, four rows at once."""
+    n = columns.size
+    for k in range(0, matrix.shape[0], 4):
+        a = load(source, columns[0]) * matrix[k, 0]
+        b = load(source, columns[0]) * matrix[k + 1, 0]
+        c = load(source, columns[0]) * matrix[k + 2, 0]
+        d = load(source, columns[0]) * matrix[k + 3, 0]
+        for m in range(1, n):
+            s = load(source, columns[m])
+            a = fma(s, matrix[k, m], a)
+            b = fma(s, matrix[k + 1, m], b)
+            c = fma(s, matrix[k + 2, m], c)
+            d = fma(s, matrix[k + 3, m], d)
+        store(target, first + k, a)
+        store(target, first + k + 1, b)
+        store(target, first + k + 2, c)
+        store(target, first + k + 3, d)
+
+
+@njit(cache=True, error_model="numpy")
+def _project(matrix, columns, source, first, target):
+    """``target[columns[m]] += Σ_k matrix[k, m] source[first + k]``."""
+    for m in range(columns.size):
+        a = load(target, columns[m])
+        b = load(source, first) * 0.0
+        c = b
+        d = b
+        for k in range(0, matrix.shape[0], 4):
+            a = fma(load(source, first + k), matrix[k, m], a)
+            b = fma(load(source, first + k + 1), matrix[k + 1, m], b)
+            c = fma(load(source, first + k + 2), matrix[k + 2, m], c)
+            d = fma(load(source, first + k + 3), matrix[k + 3, m], d)
+        store(target, columns[m], (a + b) + (c + d))
+
+
+@njit(cache=True, error_model="numpy")
+def _place_row(line, track, rows, row, nose, speed, base, weight, rise, first_track, rail, ramp):
+    """Where the poles of one row of magnets are: splines they touch, irregularity under them.
+
+    ``base`` is -1 off the guideway; ``rise`` is what the train's advance adds to the rate of the
+    splines' sum [1/s]; ``rail`` and ``ramp`` get the irregularity [m] and its rate [m/s] per side
+    and pole.
+    """
+    spacing = line.span_length / line.intervals
+    pace = speed / spacing
+    n_poles = rows.offset.size
+    for p in range(n_poles):
+        x = nose + rows.x[row] + rows.offset[p]
+        span = int(np.floor(x / line.span_length))
+        if span < 0 or span >= line.n_spans:
+            base[p] = -1
+        else:
+            local = (x - span * line.span_length) / spacing
+            interval = min(int(local), line.intervals - 1)
+            u = local - interval
+            v = 1.0 - u
+            base[p] = span * line.stride + interval
+            weight[p, 0] = v * v * v / 6.0
+            weight[p, 1] = (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
+            weight[p, 2] = (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0
+            weight[p, 3] = u * u * u / 6.0
+            rise[p, 0] = -0.5 * v * v * pace
+            rise[p, 1] = (1.5 * u * u - 2.0 * u) * pace
+            rise[p, 2] = -(1.5 * v * v - 2.0 * v) * pace
+            rise[p, 3] = 0.5 * u * u * pace
+        local = (x - track.start) / track.spacing
+        k = int(local)
+        u = local - k
+        h = track.spacing
+        a = 1.0 + u * u * (2.0 * u - 3.0)
+        b = u * (1.0 - u) * (1.0 - u) * h
+        c = u * u * (3.0 - 2.0 * u)
+        d = u * u * (u - 1.0) * h
+        e = 6.0 * u * (1.0 - u) / h
+        f = 1.0 - 4.0 * u + 3.0 * u * u
+        g = u * (3.0 * u - 2.0)
+        for side in range(2):
+            y0 = track.value[first_track + side, k]
+            y1 = track.value[first_track + side, k + 1]
+            s0 = track.slope[first_track + side, k]
+            s1 = track.slope[first_track + side, k + 1]
+            rail[side, p] = a * y0 + b * s0 + c * y1 + d * s1
+            ramp[side, p] = speed * (e * (y1 - y0) + f * s0 + g * s1)
+
+
+@njit(cache=True, error_model="numpy")
+def _magnets(
+    line,
+    track,
+    rows,
+    run,
+    nose,
+    gains,
+    x,
+    velocity,
+    force,
+    rail_motion,
+    rail_velocity,
+    rail_force,
+    outcome,
+    magnet_min,
+    magnet_max,
+    magnet_gap,
+    magnet_current,
+    scratch,
+):
+    """Close all magnets of one kind: gaps, currents, forces on train and rails."""
+    base, weight, rise, rail, ramp = scratch
+    n_poles = rows.offset.size
+    kind = 1 if rows.is_guidance else 0
+    proportional = load(gains, 2 * kind)
+    derivative = load(gains, 2 * kind + 1)
+    least = load(outcome.gap_min, kind)
+    most = load(outcome.gap_max, kind)
+    strongest = load(outcome.current_max, kind)
+    at_rest = least * 0.0 + rows.current_reference
+    for row in range(rows.x.size):
+        _place_row(
+            line, track, rows, row, nose, run.speed, base, weight, rise, 2 * kind, rail, ramp
+        )
+        for side in range(2):
+            field = 2 if kind == 1 else side
+            motion, motion_velocity, rail_pull = (
+                rail_motion[field],
+                rail_velocity[field],
+                rail_force[field],
+            )
+            sign = rows.outward[side]
+            translation = rows.translation[row, side]
+            rotation = rows.rotation[row, side]
+            shift = load(x, translation)
+            turn = load(x, rotation)
+            shift_velocity = load(velocity, translation)
+            turn_velocity = load(velocity, rotation)
+            total = shift * 0.0
+            moment = total
+            smallest = total + 1.0e9
+            largest = total - 1.0e9
+            gap_sum = total
+            current_sum = total
+            for p in range(n_poles):
+                opening = fma(turn, rows.arm[p], shift) - rail[side, p]
+                rate = fma(turn_velocity, rows.arm[p], shift_velocity) - ramp[side, p]
+                k = base[p]
+                if k >= 0:
+                    for j in range(4):
+                        deflection = load(motion, k + j)
+                        opening = fma(deflection, -weight[p, j], opening)
+                        rate = fma(deflection, -rise[p, j], rate)
+                        rate = fma(load(motion_velocity, k + j), -weight[p, j], rate)
+                error = opening * sign
+                gap = error + rows.gap_reference
+                current = fma(proportional, error, fma(derivative, rate * sign, at_rest))
+                current = maximum(minimum(current, rows.current_max), 0.0)
+                ratio = current / gap
+                pull = ratio * ratio * rows.constant[row, side, p]
+                total = total + pull
+                moment = fma(pull, rows.arm[p], moment)
+                if k >= 0:
+                    for j in range(4):
+                        store(
+                            rail_pull, k + j, fma(pull, sign * weight[p, j], load(rail_pull, k + j))
+                        )
+                smallest = minimum(smallest, gap)
+                largest = maximum(largest, gap)
+                strongest = maximum(strongest, current)
+                gap_sum = gap_sum + gap
+                current_sum = current_sum + current
+            static_moment = rows.static_moment[row, side]
+            store(
+                force,
+                translation,
+                load(force, translation) - (total - rows.static_force[row, side]) * sign,
+            )
+            store(force, rotation, load(force, rotation) - (moment - static_moment) * sign)
+            number = rows.number[row, side]
+            store(magnet_min, number, smallest)
+            store(magnet_max, number, largest)
+            store(magnet_gap, number, gap_sum * (1.0 / n_poles))
+            store(magnet_current, number, current_sum * (1.0 / n_poles))
+            least = minimum(least, smallest)
+            most = maximum(most, largest)
+    store(outcome.gap_min, kind, least)
+    store(outcome.gap_max, kind, most)
+    store(outcome.current_max, kind, strongest)
+
+
+@njit(cache=True, error_model="numpy")
+def _links(vehicle, x, velocity, force):
+    """Add the forces of springs and dampers to the train."""
+    for link in range(vehicle.link_stiffness.size):
+        start, stop = vehicle.link_start[link], vehicle.link_start[link + 1]
+        stretch = load(x, vehicle.link_dof[start]) * vehicle.link_coefficient[start]
+        rate = load(velocity, vehicle.link_dof[start]) * vehicle.link_coefficient[start]
+        for k in range(start + 1, stop):
+            stretch = fma(load(x, vehicle.link_dof[k]), vehicle.link_coefficient[k], stretch)
+            rate = fma(load(velocity, vehicle.link_dof[k]), vehicle.link_coefficient[k], rate)
+        pull = stretch * vehicle.link_stiffness[link] + rate * vehicle.link_damping[link]
+        for k in range(start, stop):
+            dof = vehicle.link_dof[k]
+            store(force, dof, load(force, dof) - pull * vehicle.link_coefficient[k])
+
+
+@njit(cache=True, error_model="numpy")
+def _line_acceleration(line, x, velocity, force):
+    """Turn the forces on the guideway's coordinates into accelerations, in place."""
+    n = x.shape[0]
+    for i in range(n):
+        total = load(force, i)
+        for k in range(line.row_start[i], line.row_start[i + 1]):
+            j = line.column[k]
+            total = total - (load(x, j) * line.stiffness[k] + load(velocity, j) * line.damping[k])
+        store(force, i, total)
+    band = line.top_factor.shape[1]
+    first = line.n_modes
+    n_top = n - first
+    for i in range(n_top):
+        total = load(force, first + i)
+        for k in range(1, min(band, i + 1)):
+            total = total - load(force, first + i - k) * line.top_factor[i, k]
+        store(force, first + i, total * line.top_factor[i, 0])
+    for i in range(n_top - 1, -1, -1):
+        total = load(force, first + i)
+        for k in range(1, min(band, n_top - i)):
+            total = total - load(force, first + i + k) * line.top_factor[i + k, k]
+        store(force, first + i, total * line.top_factor[i, 0])
+
+
+@njit(cache=True, error_model="numpy")
+def _keep_extreme(outcome, place, value, time):
+    size = maximum(value, -1.0 * value)
+    best = load(outcome.extreme, place)
+    store(outcome.extreme_time, place, choose(size, best, time, load(outcome.extreme_time, place)))
+    store(outcome.extreme, place, maximum(size, best))
+
+
+@njit(cache=True, error_model="numpy")
+def _note_lost(run, magnet_min, magnet_max, outcome, time):
+    """Name the samples whose levitation is lost at this step; return how many still hold."""
+    holding = 0
+    for lane in range(LANES):
+        if outcome.status[lane] != COMPLETED:
+            continue
+        for magnet in range(magnet_min.shape[0]):
+            low, high = magnet_min[magnet, lane], magnet_max[magnet, lane]
+            if low > run.gap_contact and high < run.gap_lost:
+                continue
+            if low <= run.gap_contact:
+                outcome.status[lane] = CONTACT
+            elif high >= run.gap_lost:
+                outcome.status[lane] = GAP_LOST
+            else:
+                outcome.status[lane] = NOT_FINITE
+            outcome.lost_time[lane] = time
+            outcome.lost_magnet[lane] = magnet
+            break
+        if outcome.status[lane] == COMPLETED:
+            holding += 1
+    return holding
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
+    """Take one row of samples over the guideway.
+
+    Velocity Verlet with a predicted velocity in the forces: second order, one evaluation a step.
+
+    Parameters
+    ----------
+    vehicle, suspension, guidance, line, track, run
+        The system and the passage.
+    gains : (4, LANES)
+        Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d.
+    outcome
+        Receives the results; extremes start at zero, gaps at the reference.
+    """
+    n_dof, n_line = vehicle.inverse_mass.size, line.row_start.size - 1
+    n_cars = vehicle.body_z.size
+    n_magnets = 2 * (suspension.x.size + guidance.x.size)
+    most_poles = max(suspension.offset.size, guidance.offset.size)
+    dt = run.time_step
+    half, half_square = 0.5 * dt, 0.5 * dt * dt
+    x = np.zeros((n_dof, LANES))
+    velocity = np.zeros((n_dof, LANES))  # after the half kick
+    predicted = np.zeros((n_dof, LANES))
+    acceleration = np.zeros((n_dof, LANES))
+    line_x = np.zeros((n_line, LANES))
+    line_velocity = np.zeros((n_line, LANES))
+    line_predicted = np.zeros((n_line, LANES))
+    line_acceleration = np.zeros((n_line, LANES))
+    n_rail = line.n_spans * line.stride
+    roll = np.zeros((line.stride, LANES))
+    rail_motion = np.zeros((3, n_rail, LANES))  # right z, left z, y
+    rail_velocity = np.zeros((3, n_rail, LANES))
+    rail_force = np.zeros((3, n_rail, LANES))
+    magnet_min = np.zeros((n_magnets, LANES))
+    magnet_max = np.zeros((n_magnets, LANES))
+    magnet_gap = np.zeros((n_magnets, LANES))
+    magnet_current = np.zeros((n_magnets, LANES))
+    filtered = np.zeros((4, LANES))
+    scratch = (
+        np.zeros(most_poles, np.int64),
+        np.zeros((most_poles, 4)),
+        np.zeros((most_poles, 4)),
+        np.zeros((2, most_poles)),
+        np.zeros((2, most_poles)),
+    )
+    b0, b1, b2 = run.filter_b[0], run.filter_b[1], run.filter_b[2]
+    a1, a2 = run.filter_a[1], run.filter_a[2]
+    for step in range(1, run.n_steps + 1):
+        time = step * dt
+        nose = run.start + run.speed * time
+        for i in range(n_dof):
+            a, v = load(acceleration, i), load(velocity, i)
+            store(x, i, fma(a, half_square, fma(v, dt, load(x, i))))
+            store(predicted, i, fma(a, dt, v))
+            store(velocity, i, fma(a, half, v))
+            store(acceleration, i, a * 0.0)
+        for i in range(n_line):
+            a, v = load(line_acceleration, i), load(line_velocity, i)
+            store(line_x, i, fma(a, half_square, fma(v, dt, load(line_x, i))))
+            store(line_predicted, i, fma(a, dt, v))
+            store(line_velocity, i, fma(a, half, v))
+            store(line_acceleration, i, a * 0.0)
+        first = max(0, int(np.floor((nose - run.train_length) / line.span_length)))
+        last = min(line.n_spans - 1, int(np.floor(nose / line.span_length)))
+        for span in range(first, last + 1):
+            at = span * line.stride
+            for quantity in range(2):
+                source = line_x if quantity == 0 else line_predicted
+                target = rail_motion if quantity == 0 else rail_velocity
+                _transform(line.rail_z, line.vertical[span], source, at, target[0])
+                _transform(line.rail_roll, line.lateral[span], source, 0, roll)
+                _transform(line.rail_y, line.lateral[span], source, at, target[2])
+                for k in range(line.stride):
+                    mean, turn = load(target[0], at + k), load(roll, k)
+                    store(target[0], at + k, mean + turn)
+                    store(target[1], at + k, mean - turn)
+            for side in range(3):
+                for k in range(line.stride):
+                    store(rail_force[side], at + k, load(roll, k) * 0.0)
+        _links(vehicle, x, predicted, acceleration)
+        _magnets(
+            line, track, suspension, run, nose, gains, x, predicted, acceleration, rail_motion,
+            rail_velocity, rail_force, outcome, magnet_min, magnet_max, magnet_gap, magnet_current,
+            scratch,
+        )  # fmt: skip
+        _magnets(
+            line, track, guidance, run, nose, gains, x, predicted, acceleration, rail_motion,
+            rail_velocity, rail_force, outcome, magnet_min, magnet_max, magnet_gap, magnet_current,
+            scratch,
+        )  # fmt: skip
+        for span in range(first, last + 1):
+            at = span * line.stride
+            for k in range(line.stride):
+                right, left = load(rail_force[0], at + k), load(rail_force[1], at + k)
+                store(rail_force[0], at + k, right + left)
+                store(roll, k, right - left)
+            _project(line.rail_z, line.vertical[span], rail_force[0], at, line_acceleration)
+            _project(line.rail_roll, line.lateral[span], roll, 0, line_acceleration)
+            _project(line.rail_y, line.lateral[span], rail_force[2], at, line_acceleration)
+        _line_acceleration(line, line_x, line_predicted, line_acceleration)
+        for i in range(n_dof):
+            a = load(acceleration, i) * vehicle.inverse_mass[i]
+            store(acceleration, i, a)
+            store(velocity, i, fma(a, half, load(velocity, i)))
+        for i in range(n_line):
+            store(line_velocity, i, fma(load(line_acceleration, i), half, load(line_velocity, i)))
+        record = run.record_every > 0 and step % run.record_every == 0
+        row = step // run.record_every - 1 if record else 0
+        for direction in range(2):
+            shift = load(line_x, 0) * 0.0
+            raw = shift
+            for k in range(line.output_column.size):
+                weight = line.midspan[direction, k]
+                shift = fma(load(line_x, line.output_column[k]), weight, shift)
+                raw = fma(load(line_acceleration, line.output_column[k]), weight, raw)
+            s1, s2 = load(filtered, 2 * direction), load(filtered, 2 * direction + 1)
+            smooth = fma(raw, b0, s1)
+            store(filtered, 2 * direction, fma(raw, b1, s2) - smooth * a1)
+            store(filtered, 2 * direction + 1, raw * b2 - smooth * a2)
+            _keep_extreme(outcome, direction, shift, time)
+            _keep_extreme(outcome, 2 + direction, smooth, time)
+            if record:
+                store(outcome.history[row], direction, shift)
+                store(outcome.history[row], 2 + direction, smooth)
+        for car in range(n_cars):
+            up = load(acceleration, vehicle.body_z[car])
+            across = load(acceleration, vehicle.body_y[car])
+            _keep_extreme(outcome, 4 + car, up, time)
+            _keep_extreme(outcome, 4 + n_cars + car, across, time)
+            if record:
+                store(outcome.history[row], 4 + car, up)
+                store(outcome.history[row], 4 + n_cars + car, across)
+        if record:
+            at = 4 + 2 * n_cars
+            for magnet in range(n_magnets):
+                store(outcome.history[row], at + magnet, load(magnet_gap, magnet))
+                store(outcome.history[row], at + n_magnets + magnet, load(magnet_current, magnet))
+        suspicious = False
+        for lane in range(LANES):
+            low = min(outcome.gap_min[0, lane], outcome.gap_min[1, lane])
+            high = max(outcome.gap_max[0, lane], outcome.gap_max[1, lane])
+            if not (low > run.gap_contact and high < run.gap_lost):
+                suspicious = True
+        if suspicious and _note_lost(run, magnet_min, magnet_max, outcome, time) == 0:
+            return

@@ -1,0 +1,497 @@
+"""The production solver: checks what it is given, runs rows of samples, names each outcome."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+import scipy.signal
+
+from maglev.mechanics import guideway as guideway_model
+from maglev.mechanics import train as train_model
+from maglev.mechanics._kernels import (
+    COMPLETED,
+    NOT_FINITE,
+    Line,
+    MagnetRows,
+    Outcome,
+    Run,
+    Track,
+    Vehicle,
+    passage,
+)
+from maglev.mechanics.irregularity import Profile
+from maglev.mechanics.lanes import LANES
+from maglev.mechanics.reduction import SPLINE_INTERVALS, ReducedGuideway, reduce
+from maglev.parameters import Config, Magnet, Passage
+
+Array = npt.NDArray[np.float64]
+
+GIRDER_RESPONSES = (
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+)
+"""The responses of midspan, in the order of the kernels' rows."""
+
+
+@dataclass(frozen=True)
+class System:
+    """Everything a passage needs, as the kernels read it."""
+
+    train: train_model.TrainModel
+    reduced: ReducedGuideway
+    vehicle: Vehicle
+    suspension: MagnetRows
+    guidance: MagnetRows
+    line: Line
+    track: Track
+    passage: Passage
+
+
+@dataclass(frozen=True)
+class Passages:
+    """What the passages left behind; girder responses in the order of `GIRDER_RESPONSES`.
+
+    Attributes
+    ----------
+    girder, girder_time : (sample, response)
+        Largest absolute value [m, m/s²] and when it occurred [s].
+    body_z, body_y, body_z_time, body_y_time : (sample, car)
+        Largest absolute acceleration of each car body [m/s²] and when it occurred [s].
+    gap_min, gap_max, current_max : (sample, kind)
+        Of suspension and guidance [m, m, A].
+    status : (sample,)
+        How the passage ended; see `maglev.mechanics._kernels`.
+    lost_time : (sample,)
+        When levitation was lost [s]; NaN where it was not.
+    lost_magnet : (sample,)
+        Where, in the train's table of magnets; -1 where it was not.
+    time : (record,)
+        Elapsed time of the recorded steps [s].
+    girder_history : (sample, response, record)
+    body_z_history, body_y_history : (sample, car, record)
+    gap_history, current_history : (sample, magnet, record)
+        Mean gap of each magnet's poles [m] and mean current [A].
+    """
+
+    girder: Array
+    girder_time: Array
+    body_z: Array
+    body_y: Array
+    body_z_time: Array
+    body_y_time: Array
+    gap_min: Array
+    gap_max: Array
+    current_max: Array
+    status: npt.NDArray[np.int64]
+    lost_time: Array
+    lost_magnet: npt.NDArray[np.int64]
+    time: Array
+    girder_history: Array
+    body_z_history: Array
+    body_y_history: Array
+    gap_history: Array
+    current_history: Array
+
+
+def track_range(config: Config) -> tuple[float, float]:
+    """First and last place any pole visits during a passage [m], the first pier at zero."""
+    length = config.train.length
+    margin = config.train.car_pitch  # room for the poles ahead of the first magnet's centre
+    return -config.passage.approach - length - margin, config.guideway.length + length + margin
+
+
+def n_steps(config: Config) -> int:
+    """Number of time steps from the start until the tail has left the last span [-]."""
+    way = config.passage.approach + config.guideway.length + config.train.length
+    return math.ceil(way / config.passage.speed / config.passage.time_step)
+
+
+def prepare(config: Config, profile: Profile) -> System:
+    """Build train, guideway and track for the kernels and check that they can be integrated.
+
+    Parameters
+    ----------
+    config
+        Parameters of everything.
+    profile
+        Track irregularity over `track_range`.
+
+    Returns
+    -------
+    system
+        Ready for `integrate`.
+
+    Raises
+    ------
+    ValueError
+        If the time step exceeds the stability limit or the profile is shorter than the run.
+    """
+    train = train_model.build(config.train)
+    reduced = reduce(guideway_model.build(config.guideway), config.passage.mode_cutoff)
+    limit = stability_limit(config, train, reduced)
+    if not config.passage.time_step < limit:
+        raise ValueError(
+            f"passage.time_step must be below the stability limit of {limit * 1e3:.3g} ms, "
+            f"got {config.passage.time_step * 1e3:.3g} ms; take a smaller step or lower "
+            "passage.mode_cutoff"
+        )
+    start, stop = track_range(config)
+    grid_stop = profile.x0 + profile.dx * (profile.values.shape[1] - 1)
+    if profile.x0 > start or grid_stop < stop:
+        raise ValueError(
+            f"the irregularity must reach from {start:.1f} m to {stop:.1f} m, "
+            f"got {profile.x0:.1f} m to {grid_stop:.1f} m"
+        )
+    return System(
+        train=train,
+        reduced=reduced,
+        vehicle=_vehicle(train),
+        suspension=_magnet_rows(train, guidance=False),
+        guidance=_magnet_rows(train, guidance=True),
+        line=_line(reduced),
+        track=Track(
+            profile.x0,
+            profile.dx,
+            np.ascontiguousarray(profile.values),
+            np.ascontiguousarray(profile.slopes),
+        ),
+        passage=config.passage,
+    )
+
+
+def integrate(
+    system: System,
+    gains: Array,
+    *,
+    record_every: int = 0,
+    n_threads: int = 1,
+    on_progress: Callable[[int], None] | None = None,
+) -> Passages:
+    """Run one passage per row of gains.
+
+    A sample's numbers do not depend on its neighbours, on their number or on ``n_threads``.
+
+    Parameters
+    ----------
+    system
+        From `prepare`.
+    gains : (sample, 4)
+        Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d.
+    record_every
+        Steps between recorded rows of the histories; zero records none.
+    n_threads
+        Rows of samples that run at the same time.
+    on_progress
+        Called with the number of samples that have just finished.
+
+    Returns
+    -------
+    passages
+        Extremes, outcomes and histories.
+
+    Raises
+    ------
+    ValueError
+        If the gains have the wrong shape or are not finite.
+    """
+    gains = checked_gains(gains)
+    n_samples = gains.shape[0]
+    n_rows = -(-n_samples // LANES)
+    padded = np.empty((n_rows * LANES, 4))
+    padded[:n_samples] = gains
+    padded[n_samples:] = gains[-1]
+    run = _run(system, record_every)
+
+    def one_row(row: int) -> Outcome:
+        outcome = _empty_outcome(system, run)
+        lanes = np.ascontiguousarray(padded[row * LANES : (row + 1) * LANES].T)
+        passage(
+            system.vehicle,
+            system.suspension,
+            system.guidance,
+            system.line,
+            system.track,
+            run,
+            lanes,
+            outcome,
+        )
+        if on_progress is not None:
+            on_progress(min(LANES, n_samples - row * LANES))
+        return outcome
+
+    with ThreadPoolExecutor(max_workers=n_threads) as pool:
+        outcomes = list(pool.map(one_row, range(n_rows)))
+    return _gathered(outcomes, n_samples, system, run)
+
+
+def checked_gains(gains: npt.ArrayLike) -> Array:
+    """Return the gains as (sample, 4) doubles.
+
+    Raises
+    ------
+    ValueError
+        If they have another shape, are empty, negative or not finite.
+    """
+    array = np.asarray(gains, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 4:
+        hint = "; transpose them" if array.ndim == 2 and array.shape[0] == 4 else ""
+        raise ValueError(f"gains have shape {array.shape}, expected (sample, 4){hint}")
+    if array.shape[0] == 0:
+        raise ValueError("gains have no sample, expected at least one row")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if bad.size:
+        raise ValueError(
+            f"gains must be finite, got {array[bad[0]].tolist()} at sample {bad[0]}"
+            + (f" and {bad.size - 1} more" if bad.size > 1 else "")
+        )
+    return array
+
+
+def stability_limit(
+    config: Config, train: train_model.TrainModel, reduced: ReducedGuideway
+) -> float:
+    """Largest stable time step of the production solver's scheme [s].
+
+    The scheme is run on every mode of the guideway and of one car with its magnets closed linearly
+    at the mean gains.  A mode of circular frequency ω and damping ratio ζ is stable for
+    ωΔt < 2(√(1 + ζ²) − ζ) (docs/theory/integration.md).
+    """
+    squares = scipy.linalg.eigvalsh(reduced.stiffness.toarray(), reduced.mass.toarray())
+    omega = math.sqrt(squares[-1])
+    ratio = config.guideway.damping_ratio
+    limits = [2 * (math.sqrt(1 + ratio**2) - ratio) / omega]
+    one_car = train
+    if config.train.n_cars > 1:
+        one_car = train_model.build(config.train.model_copy(update={"n_cars": 1}))
+    stiffness, damping = closed_train(one_car, np.array(config.gains.as_row))
+    n = one_car.mass.size
+    inverse = 1 / one_car.mass[:, None]
+    state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse * stiffness, -inverse * damping]])
+    poles = scipy.linalg.eigvals(state)
+    size = np.abs(poles)
+    moving = size > 1e-6
+    zeta = np.clip(-poles.real[moving] / size[moving], 0.0, None)
+    limits.append(float((2 * (np.sqrt(1 + zeta**2) - zeta) / size[moving]).min()))
+    return min(limits)
+
+
+def closed_train(train: train_model.TrainModel, gains: Array) -> tuple[Array, Array]:
+    """Stiffness and damping of the train with its magnets closed linearly over a rigid track.
+
+    Parameters
+    ----------
+    train
+        Train with open magnets.
+    gains : (4,)
+        Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d.
+
+    Returns
+    -------
+    stiffness, damping : (dof, dof)
+        Each pole adds 2F₀(k_p/i₀ − 1/δ₀) and 2F₀ k_d/i₀ at its place.
+    """
+    stiffness, damping = train.stiffness.toarray(), train.damping.toarray()
+    for guidance in (False, True):
+        rows = _magnet_rows(train, guidance=guidance)
+        k_p, k_d = gains[2 * guidance], gains[2 * guidance + 1]
+        current, gap = rows.current_reference, rows.gap_reference
+        force = rows.constant * (current / gap) ** 2
+        shapes = np.stack([np.ones_like(rows.arm), rows.arm])  # (translation or rotation, pole)
+        for row, side in np.ndindex(rows.number.shape):
+            dof = np.array([rows.translation[row, side], rows.rotation[row, side]])
+            at = np.ix_(dof, dof)
+            pull = 2 * (shapes * force[row, side]) @ shapes.T
+            stiffness[at] += pull * (k_p / current - 1 / gap)
+            damping[at] += pull * (k_d / current)
+    return stiffness, damping
+
+
+def _vehicle(train: train_model.TrainModel) -> Vehicle:
+    rows = train.link_rows.tocsr()
+    return Vehicle(
+        inverse_mass=1.0 / train.mass,
+        link_start=rows.indptr.astype(np.int64),
+        link_dof=rows.indices.astype(np.int64),
+        link_coefficient=rows.data.astype(np.float64),
+        link_stiffness=np.ascontiguousarray(train.link_stiffness, dtype=np.float64),
+        link_damping=np.ascontiguousarray(train.link_damping, dtype=np.float64),
+        body_z=np.ascontiguousarray(train.car_body_dof[:, 1], dtype=np.int64),
+        body_y=np.ascontiguousarray(train.car_body_dof[:, 0], dtype=np.int64),
+    )
+
+
+def _magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
+    magnet: Magnet = (
+        train.parameters.guidance_magnet if guidance else train.parameters.suspension_magnet
+    )
+    table = train.magnets
+    right, left = (
+        np.flatnonzero((table.is_guidance == guidance) & (table.side == side)) for side in (1, -1)
+    )
+    right, left = right[np.argsort(-table.x[right])], left[np.argsort(-table.x[left])]
+    if right.size != left.size or np.abs(table.x[right] - table.x[left]).max() > 1e-9:
+        raise ValueError("magnets must stand in pairs, right and left at the same place")
+    number = np.stack([right, left], axis=1)
+    offset = train_model.pole_offsets(magnet)
+    arm = offset if guidance else -offset
+    rest = train_model.pole_static_force(train.parameters, table)[number][:, :, : offset.size]
+    return MagnetRows(
+        x=np.ascontiguousarray(table.x[right]),
+        number=number.astype(np.int64),
+        translation=table.translation_dof[number].astype(np.int64),
+        rotation=table.rotation_dof[number].astype(np.int64),
+        static_force=rest.sum(axis=2),
+        static_moment=(rest * arm).sum(axis=2),
+        constant=np.ascontiguousarray(
+            rest * (magnet.gap_reference / magnet.current_reference) ** 2
+        ),
+        offset=offset,
+        arm=arm,
+        outward=np.array([1.0, -1.0 if guidance else 1.0]),
+        gap_reference=magnet.gap_reference,
+        current_reference=magnet.current_reference,
+        current_max=magnet.current_max,
+        is_guidance=guidance,
+    )
+
+
+def _line(reduced: ReducedGuideway) -> Line:
+    columns = reduced.span_coordinates
+    scale = np.abs(reduced.rail_z).max()
+    upright = np.abs(reduced.rail_z).max(axis=0) > 1e-9 * scale
+    sideways = (np.abs(reduced.rail_roll) + np.abs(reduced.rail_y)).max(axis=0) > 1e-9 * scale
+    n_rows = reduced.rail_z.shape[0]
+    stride = -(-n_rows // 4) * 4
+    padding = ((0, stride - n_rows), (0, 0))
+    pattern = (abs(reduced.stiffness) + abs(reduced.damping)).tocsr()
+    pattern.sort_indices()
+    at = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
+    lower = np.linalg.cholesky(reduced.top_mass)
+    band = 12
+    factor = np.zeros((lower.shape[0], band))
+    for k in range(min(band, lower.shape[0])):
+        factor[k:, k] = np.diagonal(lower, -k)
+    factor[:, 0] = 1.0 / factor[:, 0]
+    middle = reduced.parameters.n_spans // 2
+    return Line(
+        n_spans=reduced.parameters.n_spans,
+        span_length=reduced.parameters.span_length,
+        intervals=SPLINE_INTERVALS,
+        stride=stride,
+        vertical=np.ascontiguousarray(columns[:, upright]),
+        lateral=np.ascontiguousarray(columns[:, sideways]),
+        rail_z=np.pad(reduced.rail_z[:, upright], padding),
+        rail_roll=np.pad(reduced.rail_roll[:, sideways], padding),
+        rail_y=np.pad(reduced.rail_y[:, sideways], padding),
+        n_modes=reduced.n_modes,
+        row_start=pattern.indptr.astype(np.int64),
+        column=pattern.indices.astype(np.int64),
+        stiffness=np.asarray(reduced.stiffness[at, pattern.indices]).ravel(),
+        damping=np.asarray(reduced.damping[at, pattern.indices]).ravel(),
+        top_factor=factor,
+        output_column=np.ascontiguousarray(columns[middle]),
+        midspan=np.stack([reduced.midspan_z, reduced.midspan_y]),
+    )
+
+
+def acceleration_filter(passage: Passage) -> tuple[Array, Array]:
+    """Coefficients (b, a) of the low-pass on guideway accelerations; the identity without a band.
+
+    Raises
+    ------
+    ValueError
+        If the band reaches half the sampling rate.
+    """
+    if passage.acceleration_band is None:
+        return np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    rate = 1 / passage.time_step
+    if not passage.acceleration_band < rate / 2:
+        raise ValueError(
+            f"passage.acceleration_band must be below half the sampling rate, {rate / 2:g} Hz, "
+            f"got {passage.acceleration_band:g} Hz"
+        )
+    b, a = scipy.signal.butter(2, passage.acceleration_band, fs=rate)
+    return np.asarray(b), np.asarray(a)
+
+
+def _run(system: System, record_every: int) -> Run:
+    passage = system.passage
+    b, a = acceleration_filter(passage)
+    length = system.train.parameters.length
+    way = passage.approach + system.reduced.parameters.length + length
+    return Run(
+        n_steps=math.ceil(way / passage.speed / passage.time_step),
+        time_step=passage.time_step,
+        speed=passage.speed,
+        start=-passage.approach,
+        train_length=length,
+        gap_contact=passage.gap_contact,
+        gap_lost=passage.gap_lost,
+        filter_b=b,
+        filter_a=a,
+        record_every=record_every,
+    )
+
+
+def _empty_outcome(system: System, run: Run) -> Outcome:
+    n_cars = system.vehicle.body_z.size
+    n_magnets = system.train.magnets.x.size
+    n_records = run.n_steps // run.record_every if run.record_every else 0
+    kinds = (system.suspension, system.guidance)
+    rest = np.array([[k.gap_reference] * LANES for k in kinds])
+    return Outcome(
+        extreme=np.zeros((4 + 2 * n_cars, LANES)),
+        extreme_time=np.zeros((4 + 2 * n_cars, LANES)),
+        gap_min=rest.copy(),
+        gap_max=rest.copy(),
+        current_max=np.array([[k.current_reference] * LANES for k in kinds]),
+        status=np.zeros(LANES, np.int64),
+        lost_time=np.full(LANES, np.nan),
+        lost_magnet=np.full(LANES, -1, np.int64),
+        history=np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets, LANES)),
+    )
+
+
+def _gathered(outcomes: list[Outcome], n_samples: int, system: System, run: Run) -> Passages:
+    n_cars = system.vehicle.body_z.size
+    n_magnets = system.train.magnets.x.size
+
+    def samples_first(name: str) -> npt.NDArray[np.float64]:
+        rows = np.concatenate([getattr(outcome, name) for outcome in outcomes], axis=-1)
+        return np.moveaxis(rows, -1, 0)[:n_samples]
+
+    status = samples_first("status").astype(np.int64)
+    extreme, when = samples_first("extreme").copy(), samples_first("extreme_time").copy()
+    status[(status == COMPLETED) & ~np.isfinite(extreme).all(axis=1)] = NOT_FINITE
+    extreme[status != COMPLETED] = np.nan
+    when[status != COMPLETED] = np.nan
+    history = np.moveaxis(samples_first("history"), 1, 2)
+    at = 4 + 2 * n_cars
+    return Passages(
+        girder=extreme[:, :4],
+        girder_time=when[:, :4],
+        body_z=extreme[:, 4 : 4 + n_cars],
+        body_y=extreme[:, 4 + n_cars :],
+        body_z_time=when[:, 4 : 4 + n_cars],
+        body_y_time=when[:, 4 + n_cars :],
+        gap_min=samples_first("gap_min"),
+        gap_max=samples_first("gap_max"),
+        current_max=samples_first("current_max"),
+        status=status,
+        lost_time=samples_first("lost_time"),
+        lost_magnet=samples_first("lost_magnet").astype(np.int64),
+        time=(np.arange(history.shape[2]) + 1) * (run.record_every * run.time_step),
+        girder_history=history[:, :4],
+        body_z_history=history[:, 4 : 4 + n_cars],
+        body_y_history=history[:, 4 + n_cars : at],
+        gap_history=history[:, at : at + n_magnets],
+        current_history=history[:, at + n_magnets :],
+    )
