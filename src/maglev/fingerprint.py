@@ -1,0 +1,99 @@
+"""Fingerprint of code: changes when the code does, not when its comments or docstrings do."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+_PACKAGE = Path(__file__).parent
+_NAME = _PACKAGE.name
+
+
+def _file(module: str) -> Path | None:
+    """The file of a dotted name inside the package, none if there is no such module."""
+    stem = _PACKAGE.joinpath(*module.split(".")[1:])
+    for path in (stem.with_suffix(".py"), stem / "__init__.py"):
+        if path.is_file():
+            return path
+    return None
+
+
+def _imports(module: str) -> Iterator[str]:
+    """Modules of the package that a module imports, wherever in it the import stands."""
+    path = _file(module)
+    if path is None:
+        raise ValueError(f"there is no module {module}")
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        else:
+            continue
+        yield from (n for n in names if n.split(".")[0] == _NAME and _file(n) is not None)
+
+
+def standing_on(*modules: str) -> tuple[str, ...]:
+    """Return modules of the package with all of the package that they import, in order of name.
+
+    Parameters
+    ----------
+    modules
+        Dotted names inside the package, such as ``"stages.passage"``.
+
+    Raises
+    ------
+    ValueError
+        If there is no such module.
+    """
+    open_names = [f"{_NAME}.{module}" for module in modules]
+    found: set[str] = set()
+    while open_names:
+        name = open_names.pop()
+        if name not in found:
+            found.add(name)
+            open_names.extend(_imports(name))
+    return tuple(sorted(found))
+
+
+def _without_docstrings(tree: ast.Module) -> ast.Module:
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        first = node.body[0] if node.body else None
+        if (
+            isinstance(first, ast.Expr)
+            and isinstance(first.value, ast.Constant)
+            and isinstance(first.value.value, str)
+        ):
+            node.body = node.body[1:]
+    return tree
+
+
+def code_of(*modules: str) -> str:
+    """Hash of the syntax trees of modules and of all of the package that they import.
+
+    Parameters
+    ----------
+    modules
+        Dotted names inside the package, such as ``"stages.passage"``.
+
+    Returns
+    -------
+    fingerprint
+        First 16 hexadecimal digits of a SHA-256 over the syntax trees without docstrings.
+
+    Raises
+    ------
+    ValueError
+        If there is no such module.
+    """
+    digest = hashlib.sha256()
+    for name in standing_on(*modules):
+        path = _file(name)
+        assert path is not None  # standing_on has found it
+        tree = _without_docstrings(ast.parse(path.read_text(encoding="utf-8")))
+        digest.update(f"{name}\n{ast.dump(tree)}\n".encode())
+    return digest.hexdigest()[:16]
