@@ -126,11 +126,26 @@ def test_substeps_repeat_the_same_increment():
     assert_allclose(grouped, once, atol=1e-15)
 
 
-def test_mass_past_a_barrier_is_removed_and_does_not_return():
-    there_and_back = np.repeat([[0.8, -0.8]], 25, axis=1)
-    total, survival, _ = evolved(there_and_back, [50.0], [50.0], SUPERBEE, upper=60)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_mass_past_a_barrier_is_removed_and_does_not_return(sign):
+    there_and_back = sign * np.repeat([[0.8, -0.8]], 25, axis=1)
+    barrier = {"upper": 60} if sign > 0 else {"lower": 41}
+    total, survival, _ = evolved(there_and_back, [50.0], [50.0], SUPERBEE, **barrier)
     assert_allclose(total.sum(), 0.0, atol=1e-6)
     assert survival[0] == 1.0
     assert np.all(np.diff(survival) <= 1e-15)
-    total, survival, _ = evolved(-there_and_back, [50.0], [50.0], SUPERBEE, upper=60)
+    total, survival, _ = evolved(-there_and_back, [50.0], [50.0], SUPERBEE, **barrier)
     assert_allclose(survival[-1], 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_survival_is_the_mass_inside_the_barriers(sign):
+    # 20 cells at half a cell a step, the barrier face 20.5 cells away: not quite half has passed
+    total, survival, _ = evolved(
+        np.full((1, 40), sign * 0.5), [80.0], [80.0 + sign * 20], UPWIND, lower=60, upper=101
+    )
+    assert np.all(total[:60] == 0.0)
+    assert np.all(total[101:] == 0.0)
+    assert_allclose(survival[-1], total.sum(), rtol=1e-12)
+    # absorbing: a mass that steps by one cell or none never returns, so it is the binomial itself
+    assert_allclose(total.sum(), stats.binom.cdf(20, 40, 0.5), rtol=1e-12)

@@ -50,6 +50,8 @@ def test_discrepancy_of_a_hand_worked_case():
     uniform = Marginals([stats.uniform(0.0, 1.0)])
     # F_n jumps to 0.2 at 0.1 and to 1.0 at 0.4: the farthest is 1.0 - 0.4 at the second jump
     assert_allclose(gf_discrepancy([[0.1], [0.4]], [0.2, 0.8], uniform), 0.6)
+    # F_n is still 0.2 just below 0.9: the farthest is 0.9 - 0.2
+    assert_allclose(gf_discrepancy([[0.9], [0.6]], [0.8, 0.2], uniform), 0.7)
     # two points on one place jump together: 0 to 1 at 0.3
     assert_allclose(gf_discrepancy([[0.3], [0.3]], [0.5, 0.5], uniform), 0.7)
 

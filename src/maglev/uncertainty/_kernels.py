@@ -36,7 +36,7 @@ def limited_jump(jump: float, upwind_jump: float, limiter: int) -> float:
     References
     ----------
     Roe, Annu. Rev. Fluid Mech. 18 (1986) 337-365; LeVeque, Finite Volume Methods for Hyperbolic
-    Problems (2002), eqs. 6.28 and 6.39b; docs/theory/pdem.md, eq. (7).
+    Problems (2002), sec. 6.11 and 6.12; docs/theory/pdem.md, eq. (7).
     """
     if limiter == UPWIND or jump * upwind_jump <= 0.0:
         return 0.0
@@ -69,7 +69,7 @@ def tvd_step(density: np.ndarray, courant: float, limiter: int, first: int, last
 
     References
     ----------
-    Li, Chen, Stochastic Dynamics of Structures (2009), sec. 7.3; LeVeque (2002), sec. 6.11;
+    Li, Chen, Stochastic Dynamics of Structures (2009), ch. 7; LeVeque (2002), sec. 6.11;
     docs/theory/pdem.md, eq. (6).
     """
     correction = 0.5 * (abs(courant) - courant * courant)

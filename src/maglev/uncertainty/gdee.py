@@ -330,7 +330,7 @@ def first_passage(
 
     References
     ----------
-    Chen, Li, Struct. Saf. 27 (2005) 253-266 (absorbing boundary); docs/theory/pdem.md, eq. (10).
+    Li, Chen, Stochastic Dynamics of Structures (2009), ch. 8; docs/theory/pdem.md, eq. (10).
     """
     histories = np.asarray(histories, dtype=float)
     if histories.ndim != 2 or histories.shape[0] < 1 or histories.shape[1] < 2:

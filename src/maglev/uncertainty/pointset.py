@@ -93,7 +93,7 @@ def gf_points(
 
     References
     ----------
-    Chen, Yang, Li, Structural Safety 59 (2016) 20-31, sec. 3; docs/theory/point_sets.md.
+    Chen, Yang, Li, Structural Safety 59 (2016) 20-31; docs/theory/point_sets.md.
     """
     _check_size(n)
     equal = np.full(n, 1.0 / n)
@@ -201,7 +201,7 @@ def rearranged(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Margina
 
     References
     ----------
-    Chen, Yang, Li, Structural Safety 59 (2016) 20-31, eqs. for the first and second
+    Chen, Yang, Li, Structural Safety 59 (2016) 20-31, the first and second
     rearrangement; docs/theory/point_sets.md, eqs. (3) and (5).
     """
     points, weights = _checked_points(points, weights, marginals)
