@@ -125,7 +125,7 @@ def _table() -> dict[str, Variable]:
         "magnet_x": Variable(
             dims=("magnet",),
             units="m",
-            long_name="centre of the magnet along travel, from the middle of the first car",
+            long_name="centre of the magnet along travel, from the nose of the train",
         ),
         "t": Variable(dims=("t",), units="s", long_name="time since the start of the passage"),
         "x": Variable(
@@ -232,21 +232,17 @@ def _table() -> dict[str, Variable]:
     table["direction"] = Variable(
         dims=("mode",),
         units="1",
-        long_name="direction in which the girders move most",
+        long_name="motion that holds most of the mode's kinetic energy",
         dtype="int8",
         flags={0: "longitudinal", 1: "lateral", 2: "vertical", 3: "torsion"},
     )
-    for axis, word in (("x", "longitudinal"), ("y", "lateral"), ("z", "vertical")):
-        table[f"girder_shape_{axis}"] = Variable(
-            dims=("mode", "x"),
-            units="1",
-            long_name=f"{word} part of the mode along the girder axes, largest part of a mode 1",
-        )
-    table["girder_shape_roll"] = Variable(
-        dims=("mode", "x"),
-        units="m-1",
-        long_name="roll of the girders in the mode, rad per unit of the largest displacement",
-    )
+    for part, where in (("girder", "the girder axis"), ("rail", "the right rail")):
+        for axis, word in (("y", "lateral"), ("z", "vertical")):
+            table[f"{part}_shape_{axis}"] = Variable(
+                dims=("mode", "x"),
+                units="1",
+                long_name=f"{word} motion of {where} in the mode, largest of all four shapes 1",
+            )
     table["frequency_simply_supported"] = Variable(
         dims=(),
         units="Hz",
@@ -363,10 +359,10 @@ LAYOUTS: Mapping[str, Layout] = {
         variables=(
             "frequency",
             "direction",
-            "girder_shape_x",
             "girder_shape_y",
             "girder_shape_z",
-            "girder_shape_roll",
+            "rail_shape_y",
+            "rail_shape_z",
             "frequency_simply_supported",
             "measured_frequency",
         ),

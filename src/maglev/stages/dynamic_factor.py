@@ -1,0 +1,124 @@
+"""Dynamic coefficient of the midspan deflection over a range of speeds.
+
+Every passage is kept as a small file of its own as soon as it is computed, under a name made from
+all that decides its content.  A sweep that was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from maglev import datasets
+from maglev.fingerprint import code_of
+from maglev.measurements import load_measurements
+from maglev.mechanics import guideway, train
+from maglev.mechanics.moving_load import dynamic_factor
+from maglev.mechanics.statics import largest_deflection
+from maglev.parameters import Config
+from maglev.simulation import simulate
+from maglev.stages import config_slice
+from maglev.stages.deflection import load_per_length
+from maglev.stages.modes import euler_span
+
+_LOG = logging.getLogger(__name__)
+
+
+def speeds(config: Config) -> np.ndarray:
+    """Speeds of the sweep (speed,) [m/s], both ends included where the step divides the range."""
+    sweep = config.validation
+    n_steps = math.floor((sweep.speed_max - sweep.speed_min) / sweep.speed_step + 1e-9)
+    return sweep.speed_min + sweep.speed_step * np.arange(n_steps + 1)
+
+
+def _at_speed(config: Config, speed: float) -> Config:
+    passage = config.passage.model_copy(update={"speed": float(speed)})
+    return config.model_copy(update={"passage": passage})
+
+
+def _passage(config: Config, store: Path, code: str) -> xr.Dataset:
+    """Extremes of one passage at the mean gains, from the store or else computed and kept."""
+    content = config_slice(config.quantities(), "passage")
+    key = json.dumps([content, code], sort_keys=True).encode()
+    path = store / f"{hashlib.sha256(key).hexdigest()[:16]}.nc"
+    if not path.is_file():
+        computed = simulate(config, np.array([config.gains.as_row]))
+        datasets.write(computed, path, "passage", config=content, code=code)
+    return datasets.read(path, "passage")
+
+
+def dataset(config: Config, store: str | Path) -> xr.Dataset:
+    """Largest deflection and dynamic coefficient at each speed, beside measurement and closed form.
+
+    Parameters
+    ----------
+    config
+        The configuration; its ``passage.speed`` plays no part.
+    store
+        Folder in which the passages are kept.
+
+    Returns
+    -------
+    dataset
+        Layout ``dynamic_factor``.
+
+    Raises
+    ------
+    ConfigError
+        If the measurements cannot be read.
+    ValueError
+        As `maglev.simulate`.
+    """
+    measured = load_measurements(config.validation.measurements).peak_deflection
+    beam, load = euler_span(config), load_per_length(config)
+    static = largest_deflection(guideway.build(config.guideway), train.build(config.train))
+    code = code_of("simulation")
+    sweep = speeds(config)
+    peaks, status = np.empty(sweep.size), np.empty(sweep.size, dtype=int)
+    began = time.perf_counter()
+    for k, speed in enumerate(sweep):
+        one = _passage(_at_speed(config, speed), Path(store), code)
+        peaks[k] = one["girder_displacement_z"].item()
+        status[k] = one["status"].item()
+        each = (time.perf_counter() - began) / (k + 1)
+        _LOG.info(
+            "%d of %d speeds done, %.2f s each, %.0f s left",
+            k + 1,
+            sweep.size,
+            each,
+            each * (sweep.size - k - 1),
+        )
+    lost = np.flatnonzero(status != 0)
+    if lost.size:
+        _LOG.warning(
+            "%d of %d passages lost levitation, first at %.0f km/h (%s)",
+            lost.size,
+            sweep.size,
+            3.6 * sweep[lost[0]],
+            datasets.STATUS[int(status[lost[0]])],
+        )
+    factors = [dynamic_factor(beam, config.train.length, float(speed)) for speed in sweep]
+    result = xr.Dataset(
+        {
+            "peak_deflection": (("speed",), peaks),
+            "dynamic_factor": (("speed",), peaks / static),
+            "dynamic_factor_moving_load": (("speed",), factors),
+            "static_deflection": ((), static),
+            "static_deflection_moving_load": ((), beam.static_deflection(load)),
+            "passage_status": (("speed",), status),
+            "measured_deflection": (("measured_speed",), [one.value for one in measured]),
+        },
+        coords={"speed": sweep, "measured_speed": [one.speed for one in measured]},
+    )
+    result["measured_deflection"].attrs = {
+        "source": "; ".join(one.source for one in measured),
+        "confidence": ", ".join(one.confidence for one in measured),
+    }
+    return result

@@ -1,0 +1,30 @@
+"""One passage at the mean gains, with its histories."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from maglev.parameters import Config
+from maglev.simulation import simulate
+
+
+def dataset(config: Config) -> xr.Dataset:
+    """Extremes and histories of one passage at the configured speed and the mean gains.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+
+    Returns
+    -------
+    dataset
+        Layout ``passage`` with histories.
+
+    Raises
+    ------
+    ValueError
+        As `maglev.simulate`.
+    """
+    return simulate(config, np.array([config.gains.as_row]), histories=True)
