@@ -212,18 +212,12 @@ def predicted_limits(
     levels = np.asarray(exceedances, float)
     if levels.ndim != 1 or not ((levels > 0.0) & (levels < 1.0)).all():
         raise ValueError(f"exceedances must lie between 0 and 1, got {exceedances}")
-    lost = np.mean(1.0 - held)
-    limits = np.empty((levels.size, values.shape[1]))
-    for response in range(values.shape[1]):
-        order = np.argsort(values[:, response], kind="stable")
-        ordered = values[order, response]
-        above = np.cumsum(held[order][::-1])[::-1] / n  # P(Y ≥ ordered, held)
-        exceedance = lost + np.append(above[1:], 0.0)
-        # the tolerance forgives the rounding of the sums, far below one point's share
-        reached = exceedance[None, :] <= levels[:, None] + 1e-6 / n
-        first = np.argmax(reached, axis=1)
-        limits[:, response] = np.where(reached.any(axis=1), ordered[first], np.inf)
-    return limits
+    if held.shape != (n,) or not ((held >= 0.0) & (held <= 1.0)).all():
+        raise ValueError(
+            f"held_probability must be {n} numbers between 0 and 1, one per point, got shape "
+            f"{held.shape}"
+        )
+    return _weighted_limits(values, levels - np.mean(1.0 - held), held / n)
 
 
 def tail_batch(
@@ -291,12 +285,14 @@ def tail_batch(
     deviation = surrogate.standard_deviation(candidates)
     scale = np.std(surrogate.values, axis=0)
     limits = predicted_limits(values, exceedances, held)
+    # where losses alone exceed the probability, the limit of the samples that hold is the target
+    standing = _weighted_limits(values, np.asarray(exceedances, float), held / held.sum())
+    limits = np.where(np.isfinite(limits), limits, standing)
 
     targets = [
         (response, _nodes(values[:, response] - limit, deviation[:, response], spread, held))
         for response, spread in enumerate(scale)
         for limit in limits[:, response]
-        if np.isfinite(limit)
     ]
     new = np.flatnonzero(distance > 0.0)
     near = np.unique(np.concatenate([nodes for _, nodes in targets] + [new[:n_new]]))
@@ -305,17 +301,16 @@ def tail_batch(
         near = near[np.linspace(0, near.size - 1, N_POOL).round().astype(int)]
     pool = np.union1d(near, new[: max(N_POOL - near.size, n_new)])
 
-    joint = []  # per target: response, covariance (node, pool)
-    for response, nodes in targets:
-        joint.append(
-            (response, surrogate.covariance(response, candidates[nodes], candidates[pool]))
-        )
+    joint = [  # per target: response, covariance (node, pool)
+        (response, surrogate.covariance(response, candidates[nodes], candidates[pool]))
+        for response, nodes in targets
+    ]
     variance = deviation[pool].T ** 2  # (response, pool)
     rows: list[list[Array]] = [[] for _ in scale]
     free = np.ones(pool.size, dtype=bool)
     chosen = np.empty(n_new, dtype=np.int64)
     for place in range(n_new):
-        gains = np.zeros((max(len(joint), 1), pool.size))
+        gains = np.empty((len(joint), pool.size))
         for target, (response, between) in enumerate(joint):
             known = variance[response] <= SETTLED * scale[response] ** 2
             taken = np.mean(between**2, axis=0) / np.where(known, np.inf, variance[response])
@@ -341,6 +336,21 @@ def tail_batch(
 
 CRITERIA = {"taylor": taylor_batch, "tail": tail_batch}
 """Criteria by the name they have in a configuration."""
+
+
+def _weighted_limits(values: Array, levels: Array, weight: Array) -> Array:
+    """Smallest value (level, response) beyond which no more than ``levels`` of ``weight`` lies."""
+    limits = np.empty((levels.size, values.shape[1]))
+    for response in range(values.shape[1]):
+        order = np.argsort(values[:, response], kind="stable")
+        ordered = values[order, response]
+        beyond = np.append(np.cumsum(weight[order][:0:-1])[::-1], 0.0)
+        # the tolerance forgives the rounding of the sums, far below one point's share
+        reached = beyond[None, :] <= levels[:, None] + 1e-6 / ordered.size
+        reached &= levels[:, None] >= 0.0
+        first = np.argmax(reached, axis=1)
+        limits[:, response] = np.where(reached.any(axis=1), ordered[first], np.inf)
+    return limits
 
 
 def _nodes(excess: Array, deviation: Array, spread: float, held: Array) -> npt.NDArray[np.int64]:

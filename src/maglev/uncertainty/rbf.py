@@ -29,8 +29,8 @@ what leaves no correct digit in double precision."""
 SHAPE_RANGE = (1e-2, 1e1)
 """Shape parameters that are tried, in 1/(typical distance between neighbours) [-]; assumed."""
 
-LENGTH_RANGE = (1.0 / 30.0, 30.0)
-"""Lengths that are tried, over the length of the isotropic fit [-]; assumed."""
+LENGTH_RANGE = (0.1, 10.0)
+"""Lengths that are tried, over those the search starts from [-]; assumed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class RBF:
     inverse_diagonal : (sample,)
         (A⁻¹)_kk of the saddle matrix A, first ``sample`` entries.
     condition
-        Condition number of A in the 1-norm [-].
+        Condition number of A in the 1-norm [-], with Φ over its largest entry.
     """
 
     points: Array
@@ -298,16 +298,21 @@ def fit_scaled_rbf(
     return ScaledRBF(points=points, values=values, responses=tuple(responses))
 
 
-def _saddle_matrix(points: Array, basis: str, shape: float, length: Array) -> Array:
-    """Whole saddle matrix A (sample + 1 + parameter, same) of the interpolation conditions."""
+def _saddle_matrix(points: Array, basis: str, shape: float, length: Array) -> tuple[Array, float]:
+    """Whole saddle matrix (sample + 1 + parameter, same) with Φ over its largest entry, and that.
+
+    The unit in which r³ is measured then says nothing about the condition number.
+    """
     n, s = points.shape
     matrix = np.zeros((n + 1 + s, n + 1 + s))
     scaled = points / length
     kernels.radial_matrix(BASES[basis], shape, scaled, scaled, matrix[:n, :n])
+    size = float(np.max(np.abs(matrix)))
+    matrix[:n, :n] /= size
     matrix[:n, n] = matrix[n, :n] = 1.0
     matrix[:n, n + 1 :] = points
     matrix[n + 1 :, :n] = points.T
-    return matrix
+    return matrix, size
 
 
 def _inverse(matrix: Array) -> tuple[tuple[Array, Array], Array, float]:
@@ -326,7 +331,8 @@ def _inverse(matrix: Array) -> tuple[tuple[Array, Array], Array, float]:
 def _solved(points: Array, values: Array, basis: str, shape: float, length: Array) -> RBF:
     """The surrogate for given shape and lengths."""
     n, s = points.shape
-    factor, inverse, condition = _inverse(_saddle_matrix(points, basis, shape, length))
+    matrix, size = _saddle_matrix(points, basis, shape, length)
+    factor, inverse, condition = _inverse(matrix)
     if not condition <= LARGEST_CONDITION:
         raise ValueError(
             f"condition number of the {basis} interpolation system must not exceed "
@@ -340,9 +346,9 @@ def _solved(points: Array, values: Array, basis: str, shape: float, length: Arra
         basis=basis,
         shape=shape,
         length=length,
-        weights=solution[:n],
+        weights=solution[:n] / size,
         tail=solution[n:],
-        inverse_diagonal=np.diag(inverse)[:n].copy(),
+        inverse_diagonal=np.diag(inverse)[:n] / size,
         condition=condition,
     )
 
@@ -378,9 +384,8 @@ def _shape_by_leave_one_out(points: Array, values: Array, basis: str, length: Ar
     right = np.concatenate([standardised, np.zeros((1 + s, values.shape[1]))])
 
     def error(log_shape: float) -> float:
-        factor, inverse, condition = _inverse(
-            _saddle_matrix(points, basis, float(np.exp(log_shape)), length)
-        )
+        matrix, _ = _saddle_matrix(points, basis, float(np.exp(log_shape)), length)
+        factor, inverse, condition = _inverse(matrix)
         if not condition <= LARGEST_CONDITION:
             return np.inf
         weights = lu_solve(factor, right)[:n]
@@ -414,7 +419,8 @@ def _length_by_leave_one_out(points: Array, values: Array, basis: str, starts: A
 
     def error(log_length: Array) -> tuple[float, Array]:
         length = np.exp(log_length)
-        factor, inverse, condition = _inverse(_saddle_matrix(points, basis, 1.0, length))
+        matrix, size = _saddle_matrix(points, basis, 1.0, length)
+        factor, inverse, condition = _inverse(matrix)
         if not condition <= LARGEST_CONDITION:
             return rejected, np.zeros(s)
         weights = lu_solve(factor, right)[:n]
@@ -422,6 +428,7 @@ def _length_by_leave_one_out(points: Array, values: Array, basis: str, starts: A
         diagonal = np.diag(inverse)
         residual = _leave_one_out(points, weights[:, None], diagonal)[:, 0]
         kernels.radial_slope_matrix(BASES[basis], 1.0, points / length, slope)
+        slope[:] /= size  # the residuals do not depend on size, hence neither on its slope
         mean_square = np.mean(residual**2)
         gradient = np.empty(s)
         for d in range(s):

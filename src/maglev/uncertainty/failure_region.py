@@ -1,0 +1,237 @@
+"""Where samples are lost: the border learnt from those that were, its probability, its uncertainty.
+
+Whether a sample is lost is no matter of chance: there is a border g(u) = βᵀf(u) = 0, sharp but not
+known.  Its posterior is a set of borders, drawn so that each agrees with the samples seen; what
+they disagree about is the uncertainty.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+from scipy.special import expit
+from sklearn.linear_model import LogisticRegression
+
+from maglev.uncertainty._border_kernels import border_chain
+from maglev.uncertainty.surrogate import Array, checked_points
+
+PRIOR_DEVIATION = {"constant": 6.0, "linear": 1.0, "quadratic": 0.1}
+"""Prior standard deviations of the coefficients of the border [-]; assumed: a plane some three
+standard deviations from the mean of the inputs, bent a little."""
+
+SHARPNESS = 20.0
+"""Log-odds per unit of g [-]; assumed: a border that is blurred over a twentieth of a standard
+deviation of the inputs, which also forgives a border that is not quite quadratic."""
+
+N_DRAWS, N_BETWEEN, N_BEFORE = 200, 10, 500
+"""Borders kept, steps of the chain between two of them, steps before the first; assumed, and
+checked against a border whose posterior is known."""
+
+N_POOL = 1024
+"""Candidates that are compared in full, those in most doubt first; assumed."""
+
+SETTLED = 1e-6
+"""Variance of an outcome below which all borders agree on it [-]; assumed, a thousandth of the
+share of one border."""
+
+BLOCK = 8192
+"""Points per block in sums over a population; bounds the memory; assumed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FailureRegion:
+    """Learnt region of lost samples.
+
+    Parameters
+    ----------
+    borders : (draw, feature)
+        Coefficients β of equally likely borders [-], for the features 1, u_i and u_i u_j (i ≤ j).
+    n_parameters
+        Number of inputs.
+    """
+
+    borders: Array
+    n_parameters: int
+
+    def lost_probability(self, points: npt.ArrayLike) -> Array:
+        """Probability that a sample at each point is lost.
+
+        Parameters
+        ----------
+        points : (point, parameter)
+            Standardised points [-].
+
+        Returns
+        -------
+        probability : (point,)
+            Mean over the borders [-]; near 0.5 where they disagree.
+
+        Raises
+        ------
+        ValueError
+            If ``points`` are not finite or have another number of parameters.
+        """
+        points = checked_points(points, self.n_parameters)
+        probability = np.empty(points.shape[0])
+        for start in range(0, points.shape[0], BLOCK):
+            block = points[start : start + BLOCK]
+            probability[start : start + BLOCK] = self._by_border(block).mean(axis=1)
+        return probability
+
+    def total_probability(self, population: npt.ArrayLike) -> Array:
+        """Probability that a random sample is lost, for each border.
+
+        Parameters
+        ----------
+        population : (point, parameter)
+            Equally likely draws from the input density, standardised [-].
+
+        Returns
+        -------
+        probability : (draw,)
+            P(lost) [-]: the mean is its estimate, the quantiles are its credible interval.  The
+            noise of the population itself is not in it.
+
+        Raises
+        ------
+        ValueError
+            If the population is empty, not finite or has another number of parameters.
+        """
+        population = checked_points(population, self.n_parameters)
+        if population.shape[0] == 0:
+            raise ValueError("a population must have at least one point, got none; draw some")
+        total = np.zeros(self.borders.shape[0])
+        for start in range(0, population.shape[0], BLOCK):
+            total += self._by_border(population[start : start + BLOCK]).sum(axis=0)
+        return total / population.shape[0]
+
+    def _by_border(self, points: Array) -> Array:
+        """Probability (point, draw) to be lost, for each border."""
+        return expit(SHARPNESS * (_features(points) @ self.borders.T))
+
+
+def fit_failure_region(
+    points: npt.ArrayLike, lost: npt.ArrayLike, rng: np.random.Generator
+) -> FailureRegion:
+    """Learn where samples are lost.
+
+    The coefficients of the quadratic border have independent normal priors of zero mean; the
+    posterior is drawn by elliptical slice sampling, from a logistic regression on.
+
+    Parameters
+    ----------
+    points : (sample, parameter)
+        Every standardised sample, held or lost [-].
+    lost : (sample,) of bool
+        Which samples were lost.
+    rng
+        Source of the draws.
+
+    Returns
+    -------
+    region
+        The learnt region.
+
+    Raises
+    ------
+    ValueError
+        If ``lost`` is not boolean or does not fit, or if all samples held or all were lost.
+
+    References
+    ----------
+    Murray, Adams, MacKay, Elliptical slice sampling, Proc. AISTATS (2010), fig. 2.
+    """
+    points = checked_points(points)
+    lost = np.asarray(lost)
+    n, s = points.shape
+    if lost.dtype != np.bool_ or lost.shape != (n,):
+        raise ValueError(
+            f"lost must be {n} booleans, one per sample, got {lost.dtype} of shape {lost.shape}"
+        )
+    n_lost = int(lost.sum())
+    if n_lost in (0, n):
+        raise ValueError(
+            f"learning a border needs samples on both sides, got {n_lost} lost of {n}; without "
+            "any, report the binomial bound of the probability instead"
+        )
+    features = _features(points)
+    prior = np.repeat(list(PRIOR_DEVIATION.values()), [1, s, s * (s + 1) // 2])
+    signed = SHARPNESS * np.where(lost, 1.0, -1.0)[:, None] * features * prior
+
+    regression = LogisticRegression(solver="newton-cholesky", fit_intercept=False)
+    start = regression.fit(features * prior, lost).coef_[0]
+    borders = np.empty((N_DRAWS, prior.size))
+    border_chain(signed, start, N_BEFORE, N_BETWEEN, rng, borders)
+    return FailureRegion(borders=borders * prior, n_parameters=s)
+
+
+def border_batch(
+    region: FailureRegion, occupied: npt.ArrayLike, candidates: npt.ArrayLike, n_new: int
+) -> npt.NDArray[np.int64]:
+    """Candidates whose outcome says most about the probability of being lost.
+
+    With I_d(c) the outcome at c and P_d the probability of being lost, both for border d, the
+    variance of P that a run at c takes away is cov(I(c), P)²/var I(c).  After each choice the part
+    of I and P that the chosen outcome explains linearly is removed.
+
+    Parameters
+    ----------
+    region
+        The learnt region.
+    occupied : (sample, parameter)
+        Every sample so far, standardised [-].
+    candidates : (candidate, parameter)
+        Equally likely draws from the input density, standardised [-].
+    n_new
+        How many to choose.
+
+    Returns
+    -------
+    chosen : (n_new,)
+        Indices into ``candidates``, in the order of choice, all different.
+
+    Raises
+    ------
+    ValueError
+        If arrays do not fit or fewer than ``n_new`` candidates are new.
+
+    References
+    ----------
+    docs/theory/adaptive_sampling.md, sec. 5.
+    """
+    occupied = checked_points(occupied, region.n_parameters)
+    candidates = checked_points(candidates, region.n_parameters)
+    new = np.flatnonzero(cKDTree(occupied).query(candidates)[0] > 0.0)
+    if not 1 <= n_new <= new.size:
+        raise ValueError(
+            f"a batch must have between 1 and {new.size} points, as many as there are candidates "
+            f"not run yet, got {n_new}; draw more candidates"
+        )
+    total = region.total_probability(candidates)
+    total = total - total.mean()
+    doubt = region.lost_probability(candidates[new])
+    pool = new[np.argsort(-doubt * (1.0 - doubt), kind="stable")[: max(N_POOL, n_new)]]
+    outcome = region._by_border(candidates[pool])
+    outcome = outcome - outcome.mean(axis=1, keepdims=True)
+    chosen = np.empty(n_new, dtype=np.int64)
+    free = np.ones(pool.size, dtype=bool)
+    for place in range(n_new):
+        square = np.einsum("cd,cd->c", outcome, outcome)
+        known = square <= SETTLED * outcome.shape[1]
+        gain = np.where(known, 0.0, (outcome @ total) ** 2 / np.where(known, 1.0, square))
+        best = int(np.argmax(np.where(free, gain, -1.0)))
+        free[best] = False
+        chosen[place] = pool[best]
+        if not known[best]:
+            explained = outcome[best] / np.sqrt(square[best])
+            total = total - (total @ explained) * explained
+            outcome = outcome - np.outer(outcome @ explained, explained)
+    return chosen
+
+
+def _features(points: Array) -> Array:
+    """Constant, inputs, squares and products (point, feature)."""
+    s = points.shape[1]
+    products = [points[:, i] * points[:, j] for i in range(s) for j in range(i, s)]
+    return np.column_stack([np.ones(points.shape[0]), points, *products])
