@@ -762,8 +762,17 @@ class Passage(Parameters):
     time_step: float = quantity("s", "Δt", "0.25 ms", source="D", confidence="M", above=0)
     mode_cutoff: float = quantity(
         "Hz",
-        "highest guideway component mode that the production solver keeps",
-        500,
+        "highest mode of the middle span, where responses are taken, in the production solver; "
+        "damping is a share of critical up to here",
+        700,
+        source="D",
+        confidence="M",
+        above=0,
+    )
+    mode_cutoff_elsewhere: float = quantity(
+        "Hz",
+        "highest mode of piers and other spans in the production solver",
+        200,
         source="D",
         confidence="M",
         above=0,

@@ -57,19 +57,28 @@ class Line(NamedTuple):
     span_length: float
     intervals: int  # splines' intervals a span
     stride: int  # rows of spline coefficients a span, at least intervals + 3, a multiple of 4
-    vertical: np.ndarray  # (span, column) coordinates that move the rails' mean up and down
-    lateral: np.ndarray  # (span, column) coordinates that roll the span or move it sideways
-    rail_z: np.ndarray  # (stride, vertical column)
-    rail_roll: np.ndarray  # (stride, lateral column)
-    rail_y: np.ndarray  # (stride, lateral column)
+    upright_start: np.ndarray  # (span + 1,)
+    upright: np.ndarray  # coordinates that move a span's rails up and down
+    sideways_start: np.ndarray  # (span + 1,)
+    sideways: np.ndarray  # coordinates that roll a span or move it sideways
+    rail_z: np.ndarray  # (upright, stride)
+    rail_roll: np.ndarray  # (sideways, stride)
+    rail_y: np.ndarray  # (sideways, stride)
     n_modes: int
-    row_start: np.ndarray  # (coordinate + 1,) stiffness and damping, same pattern
+    row_start: np.ndarray  # (coordinate + 1,) stiffness
     column: np.ndarray
     stiffness: np.ndarray
+    carried_start: np.ndarray  # (mode + 1,) what modes take along of the pier tops' motion
+    carried_column: np.ndarray
+    carried: np.ndarray
+    damping_start: np.ndarray  # (coordinate + 1,) on relative rates
+    damping_column: np.ndarray
     damping: np.ndarray
+    response: np.ndarray  # (coordinate,) makes the step exact for a mode on its own [-]
     top_factor: np.ndarray  # (top, band) Cholesky rows of the pier tops' mass, diagonal inverted
     output_column: np.ndarray  # (output column,) coordinates that move midspan
     midspan: np.ndarray  # (2, output column) z and y
+    midspan_acceleration: np.ndarray  # (2, output column) the same per stepped acceleration
 
 
 class Track(NamedTuple):
@@ -111,20 +120,17 @@ class Outcome(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _transform(matrix, columns, source, first, target):
-    """``target[first + k] = Σ_m matrix[k, m] source[columns[m]]``, four rows at once."""
-    n = columns.size
-    for k in range(0, matrix.shape[0], 4):
-        a = load(source, columns[0]) * matrix[k, 0]
-        b = load(source, columns[0]) * matrix[k + 1, 0]
-        c = load(source, columns[0]) * matrix[k + 2, 0]
-        d = load(source, columns[0]) * matrix[k + 3, 0]
-        for m in range(1, n):
+def _transform(matrix, columns, start, stop, source, first, target):
+    """``target[first + k] = Σ_m matrix[m, k] source[columns[m]]``, four rows at once."""
+    for k in range(0, matrix.shape[1], 4):
+        a = load(source, 0) * 0.0
+        b, c, d = a, a, a
+        for m in range(start, stop):
             s = load(source, columns[m])
-            a = fma(s, matrix[k, m], a)
-            b = fma(s, matrix[k + 1, m], b)
-            c = fma(s, matrix[k + 2, m], c)
-            d = fma(s, matrix[k + 3, m], d)
+            a = fma(s, matrix[m, k], a)
+            b = fma(s, matrix[m, k + 1], b)
+            c = fma(s, matrix[m, k + 2], c)
+            d = fma(s, matrix[m, k + 3], d)
         store(target, first + k, a)
         store(target, first + k + 1, b)
         store(target, first + k + 2, c)
@@ -132,18 +138,17 @@ def _transform(matrix, columns, source, first, target):
 
 
 @njit(cache=True, error_model="numpy")
-def _project(matrix, columns, source, first, target):
-    """``target[columns[m]] += Σ_k matrix[k, m] source[first + k]``."""
-    for m in range(columns.size):
+def _project(matrix, columns, start, stop, source, first, target):
+    """``target[columns[m]] += Σ_k matrix[m, k] source[first + k]``."""
+    for m in range(start, stop):
         a = load(target, columns[m])
-        b = load(source, first) * 0.0
-        c = b
-        d = b
-        for k in range(0, matrix.shape[0], 4):
-            a = fma(load(source, first + k), matrix[k, m], a)
-            b = fma(load(source, first + k + 1), matrix[k + 1, m], b)
-            c = fma(load(source, first + k + 2), matrix[k + 2, m], c)
-            d = fma(load(source, first + k + 3), matrix[k + 3, m], d)
+        b = a * 0.0
+        c, d = b, b
+        for k in range(0, matrix.shape[1], 4):
+            a = fma(load(source, first + k), matrix[m, k], a)
+            b = fma(load(source, first + k + 1), matrix[m, k + 1], b)
+            c = fma(load(source, first + k + 2), matrix[m, k + 2], c)
+            d = fma(load(source, first + k + 3), matrix[m, k + 3], d)
         store(target, columns[m], (a + b) + (c + d))
 
 
@@ -316,15 +321,28 @@ def _links(vehicle, x, velocity, force):
 
 
 @njit(cache=True, error_model="numpy")
-def _line_acceleration(line, x, velocity, force):
+def _line_acceleration(line, x, velocity, relative, force):
     """Turn the forces on the guideway's coordinates into accelerations, in place."""
-    n = x.shape[0]
+    n, n_modes = x.shape[0], line.n_modes
+    for i in range(n):
+        store(relative, i, load(velocity, i))
+    for i in range(n_modes):
+        rate = load(velocity, i)
+        for k in range(line.carried_start[i], line.carried_start[i + 1]):
+            rate = fma(load(velocity, line.carried_column[k]), -line.carried[k], rate)
+        store(relative, i, rate)
     for i in range(n):
         total = load(force, i)
         for k in range(line.row_start[i], line.row_start[i + 1]):
-            j = line.column[k]
-            total = total - (load(x, j) * line.stiffness[k] + load(velocity, j) * line.damping[k])
-        store(force, i, total)
+            total = fma(load(x, line.column[k]), -line.stiffness[k], total)
+        drag = total * 0.0
+        for k in range(line.damping_start[i], line.damping_start[i + 1]):
+            drag = fma(load(relative, line.damping_column[k]), -line.damping[k], drag)
+        store(force, i, (total + drag) * line.response[i])
+        if i < n_modes:
+            for k in range(line.carried_start[i], line.carried_start[i + 1]):
+                top = line.carried_column[k]
+                store(force, top, fma(drag, -line.carried[k], load(force, top)))
     band = line.top_factor.shape[1]
     first = line.n_modes
     n_top = n - first
@@ -402,6 +420,7 @@ def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
     line_velocity = np.zeros((n_line, LANES))
     line_predicted = np.zeros((n_line, LANES))
     line_acceleration = np.zeros((n_line, LANES))
+    line_relative = np.zeros((n_line, LANES))
     n_rail = line.n_spans * line.stride
     roll = np.zeros((line.stride, LANES))
     rail_motion = np.zeros((3, n_rail, LANES))  # right z, left z, y
@@ -440,12 +459,14 @@ def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
         last = min(line.n_spans - 1, int(np.floor(nose / line.span_length)))
         for span in range(first, last + 1):
             at = span * line.stride
+            up, up_end = line.upright_start[span], line.upright_start[span + 1]
+            out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
             for quantity in range(2):
                 source = line_x if quantity == 0 else line_predicted
                 target = rail_motion if quantity == 0 else rail_velocity
-                _transform(line.rail_z, line.vertical[span], source, at, target[0])
-                _transform(line.rail_roll, line.lateral[span], source, 0, roll)
-                _transform(line.rail_y, line.lateral[span], source, at, target[2])
+                _transform(line.rail_z, line.upright, up, up_end, source, at, target[0])
+                _transform(line.rail_roll, line.sideways, out, out_end, source, 0, roll)
+                _transform(line.rail_y, line.sideways, out, out_end, source, at, target[2])
                 for k in range(line.stride):
                     mean, turn = load(target[0], at + k), load(roll, k)
                     store(target[0], at + k, mean + turn)
@@ -466,14 +487,16 @@ def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
         )  # fmt: skip
         for span in range(first, last + 1):
             at = span * line.stride
+            up, up_end = line.upright_start[span], line.upright_start[span + 1]
+            out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
             for k in range(line.stride):
                 right, left = load(rail_force[0], at + k), load(rail_force[1], at + k)
                 store(rail_force[0], at + k, right + left)
                 store(roll, k, right - left)
-            _project(line.rail_z, line.vertical[span], rail_force[0], at, line_acceleration)
-            _project(line.rail_roll, line.lateral[span], roll, 0, line_acceleration)
-            _project(line.rail_y, line.lateral[span], rail_force[2], at, line_acceleration)
-        _line_acceleration(line, line_x, line_predicted, line_acceleration)
+            _project(line.rail_z, line.upright, up, up_end, rail_force[0], at, line_acceleration)
+            _project(line.rail_roll, line.sideways, out, out_end, roll, 0, line_acceleration)
+            _project(line.rail_y, line.sideways, out, out_end, rail_force[2], at, line_acceleration)
+        _line_acceleration(line, line_x, line_predicted, line_relative, line_acceleration)
         for i in range(n_dof):
             a = load(acceleration, i) * vehicle.inverse_mass[i]
             store(acceleration, i, a)
@@ -486,9 +509,11 @@ def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
             shift = load(line_x, 0) * 0.0
             raw = shift
             for k in range(line.output_column.size):
-                weight = line.midspan[direction, k]
-                shift = fma(load(line_x, line.output_column[k]), weight, shift)
-                raw = fma(load(line_acceleration, line.output_column[k]), weight, raw)
+                column = line.output_column[k]
+                shift = fma(load(line_x, column), line.midspan[direction, k], shift)
+                raw = fma(
+                    load(line_acceleration, column), line.midspan_acceleration[direction, k], raw
+                )
             s1, s2 = load(filtered, 2 * direction), load(filtered, 2 * direction + 1)
             smooth = fma(raw, b0, s1)
             store(filtered, 2 * direction, fma(raw, b1, s2) - smooth * a1)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 import scipy.signal
+import scipy.sparse as sp
 
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
@@ -31,6 +32,7 @@ from maglev.mechanics.reduction import SPLINE_INTERVALS, ReducedGuideway, reduce
 from maglev.parameters import Config, Magnet, Passage
 
 Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 GIRDER_RESPONSES = (
     "girder_displacement_z",
@@ -135,7 +137,11 @@ def prepare(config: Config, profile: Profile) -> System:
         If the time step exceeds the stability limit or the profile is shorter than the run.
     """
     train = train_model.build(config.train)
-    reduced = reduce(guideway_model.build(config.guideway), config.passage.mode_cutoff)
+    reduced = reduce(
+        guideway_model.build(config.guideway),
+        config.passage.mode_cutoff,
+        config.passage.mode_cutoff_elsewhere,
+    )
     limit = stability_limit(config, train, reduced)
     if not config.passage.time_step < limit:
         raise ValueError(
@@ -156,7 +162,7 @@ def prepare(config: Config, profile: Profile) -> System:
         vehicle=_vehicle(train),
         suspension=_magnet_rows(train, guidance=False),
         guidance=_magnet_rows(train, guidance=True),
-        line=_line(reduced),
+        line=_line(reduced, config.passage.time_step),
         track=Track(
             profile.x0,
             profile.dx,
@@ -264,10 +270,12 @@ def stability_limit(
     at the mean gains.  A mode of circular frequency ω and damping ratio ζ is stable for
     ωΔt < 2(√(1 + ζ²) − ζ) (docs/theory/integration.md).
     """
-    squares = scipy.linalg.eigvalsh(reduced.stiffness.toarray(), reduced.mass.toarray())
-    omega = math.sqrt(squares[-1])
-    ratio = config.guideway.damping_ratio
-    limits = [2 * (math.sqrt(1 + ratio**2) - ratio) / omega]
+    ratio, dt = config.guideway.damping_ratio, config.passage.time_step
+    damped = math.sqrt(1 + ratio**2) - ratio
+    mass = reduced.mass.toarray()
+    mass[np.diag_indices(reduced.n_modes)] /= step_response(reduced, dt)[: reduced.n_modes]
+    square = scipy.linalg.eigvalsh(reduced.stiffness.toarray(), mass)[-1]
+    limits = [2 * damped / math.sqrt(square)]
     one_car = train
     if config.train.n_cars > 1:
         one_car = train_model.build(config.train.model_copy(update={"n_cars": 1}))
@@ -281,6 +289,34 @@ def stability_limit(
     zeta = np.clip(-poles.real[moving] / size[moving], 0.0, None)
     limits.append(float((2 * (np.sqrt(1 + zeta**2) - zeta) / size[moving]).min()))
     return min(limits)
+
+
+def step_response(reduced: ReducedGuideway, time_step: float) -> Array:
+    """Share of its acceleration with which each coordinate is stepped.
+
+    Verlet's step with sinc²(ωΔt/2) times the acceleration is exact for an undamped mode of circular
+    frequency ω on its own, whatever the force at the steps; pier tops are stepped as they are.
+
+    Parameters
+    ----------
+    reduced
+        Guideway in component coordinates.
+    time_step
+        Δt [s].
+
+    Returns
+    -------
+    response : (coordinate,)
+        [-].
+
+    References
+    ----------
+    Hairer, Lubich, Wanner, Geometric Numerical Integration (2006), ch. XIII (Gautschi).
+    """
+    response = np.ones(reduced.n_coordinates)
+    omega = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes])
+    response[: reduced.n_modes] = np.sinc(omega * time_step / (2 * np.pi)) ** 2
+    return response
 
 
 def closed_train(train: train_model.TrainModel, gains: Array) -> tuple[Array, Array]:
@@ -363,43 +399,78 @@ def _magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows
     )
 
 
-def _line(reduced: ReducedGuideway) -> Line:
+def _line(reduced: ReducedGuideway, time_step: float) -> Line:
     columns = reduced.span_coordinates
-    scale = np.abs(reduced.rail_z).max()
-    upright = np.abs(reduced.rail_z).max(axis=0) > 1e-9 * scale
-    sideways = (np.abs(reduced.rail_roll) + np.abs(reduced.rail_y)).max(axis=0) > 1e-9 * scale
-    n_rows = reduced.rail_z.shape[0]
-    stride = -(-n_rows // 4) * 4
-    padding = ((0, stride - n_rows), (0, 0))
-    pattern = (abs(reduced.stiffness) + abs(reduced.damping)).tocsr()
-    pattern.sort_indices()
-    at = np.repeat(np.arange(pattern.shape[0]), np.diff(pattern.indptr))
+    n_coefficients = reduced.rail_z[0].shape[1]
+    stride = -(-n_coefficients // 4) * 4
+    scale = 1e-9 * max(np.abs(z).max() for z in reduced.rail_z)
+    upright = [np.abs(z).max(axis=1) > scale for z in reduced.rail_z]
+    sideways = [
+        (np.abs(roll) + np.abs(y)).max(axis=1) > scale
+        for roll, y in zip(reduced.rail_roll, reduced.rail_y, strict=True)
+    ]
+
+    def stacked(shapes: tuple[Array, ...], chosen: list[npt.NDArray[np.bool_]]) -> Array:
+        rows = [shape[which] for shape, which in zip(shapes, chosen, strict=True)]
+        return np.pad(np.concatenate(rows), ((0, 0), (0, stride - n_coefficients)))
+
+    def numbered(chosen: list[npt.NDArray[np.bool_]]) -> tuple[IntArray, IntArray]:
+        counts = [int(which.sum()) for which in chosen]
+        numbers = [column[which] for column, which in zip(columns, chosen, strict=True)]
+        return np.concatenate([[0], np.cumsum(counts)]), np.concatenate(numbers)
+
+    upright_start, upright_column = numbered(upright)
+    sideways_start, sideways_column = numbered(sideways)
+    response = step_response(reduced, time_step)
+    damping = reduced.relative_damping.copy()
+    phase = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes]) * time_step
+    own = damping.diagonal()
+    own[: reduced.n_modes] /= np.sinc(phase / np.pi)  # rate of a stepped mode against the true one
+    damping.setdiag(own)
     lower = np.linalg.cholesky(reduced.top_mass)
-    band = 12
-    factor = np.zeros((lower.shape[0], band))
-    for k in range(min(band, lower.shape[0])):
+    factor = np.zeros((lower.shape[0], 12))  # a pier top meets its neighbours' six each
+    for k in range(min(factor.shape)):
         factor[k:, k] = np.diagonal(lower, -k)
     factor[:, 0] = 1.0 / factor[:, 0]
     middle = reduced.parameters.n_spans // 2
+    midspan = np.stack([reduced.midspan_z, reduced.midspan_y])
+    row_start, column, stiffness = _rows(reduced.stiffness)
+    carried_start, carried_column, carried = _rows(reduced.carried)
+    damping_start, damping_column, damping_value = _rows(damping)
     return Line(
         n_spans=reduced.parameters.n_spans,
         span_length=reduced.parameters.span_length,
         intervals=SPLINE_INTERVALS,
         stride=stride,
-        vertical=np.ascontiguousarray(columns[:, upright]),
-        lateral=np.ascontiguousarray(columns[:, sideways]),
-        rail_z=np.pad(reduced.rail_z[:, upright], padding),
-        rail_roll=np.pad(reduced.rail_roll[:, sideways], padding),
-        rail_y=np.pad(reduced.rail_y[:, sideways], padding),
+        upright_start=upright_start,
+        upright=upright_column,
+        sideways_start=sideways_start,
+        sideways=sideways_column,
+        rail_z=stacked(reduced.rail_z, upright),
+        rail_roll=stacked(reduced.rail_roll, sideways),
+        rail_y=stacked(reduced.rail_y, sideways),
         n_modes=reduced.n_modes,
-        row_start=pattern.indptr.astype(np.int64),
-        column=pattern.indices.astype(np.int64),
-        stiffness=np.asarray(reduced.stiffness[at, pattern.indices]).ravel(),
-        damping=np.asarray(reduced.damping[at, pattern.indices]).ravel(),
+        row_start=row_start,
+        column=column,
+        stiffness=stiffness,
+        carried_start=carried_start,
+        carried_column=carried_column + reduced.n_modes,
+        carried=carried,
+        damping_start=damping_start,
+        damping_column=damping_column,
+        damping=damping_value,
+        response=response,
         top_factor=factor,
-        output_column=np.ascontiguousarray(columns[middle]),
-        midspan=np.stack([reduced.midspan_z, reduced.midspan_y]),
+        output_column=columns[middle],
+        midspan=midspan,
+        midspan_acceleration=midspan / response[columns[middle]],
     )
+
+
+def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, Array]:
+    """Row starts, columns and values of a sparse matrix in order."""
+    rows = matrix.tocsr().sorted_indices()
+    return rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data
 
 
 def acceleration_filter(passage: Passage) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ the train is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,15 +20,11 @@ from maglev.parameters import Guideway
 
 Array = npt.NDArray[np.float64]
 
-SPLINE_INTERVALS = 16
+SPLINE_INTERVALS = 24
 """Intervals of the cubic B-splines that carry the rails' motion along a span [-]; assumed, checked
 in the convergence table."""
 
-DAMPING_SPANS = 9
-"""Spans of the line whose damping matrix is formed exactly; a longer line repeats its middle [-];
-assumed, checked in the tests."""
-
-DAMPING_DROP = 1e-4
+DAMPING_DROP = 1e-3
 """Entries of the damping matrix below this share of their diagonals are dropped [-]; assumed,
 checked in the tests against the damping ratio of every mode."""
 
@@ -41,33 +37,39 @@ class ReducedGuideway:
     ----------
     n_modes
         Coordinates with unit mass; the remaining ones are pier tops, six each.
-    span_coordinates : (span, column)
+    span_coordinates : span of (column,)
         Coordinates that move span j: its modes, then its two pier tops.
-    top_mass : (6 pier, 6 pier)
+    top_mass : (top, top)
         Banded mass matrix of the pier tops [kg, kg m, kg m²].
-    stiffness, damping : (coordinate, coordinate)
+    stiffness : (coordinate, coordinate)
         Sparse.
-    rail_z, rail_roll, rail_y : (coefficient, column)
+    carried : (mode, top)
+        Share of a pier top's motion that a component mode takes along; sparse.  Without it a mode's
+        coordinate is its motion relative to the pier tops.
+    relative_damping : (coordinate, coordinate)
+        Acts on the relative rates of the modes and the rates of the pier tops; sparse.
+    rail_z, rail_roll, rail_y : span of (column, coefficient)
         B-spline coefficients along a span of a rail's vertical motion on the centre line, of the
         roll times the rail's distance from it, and of its lateral motion, per unit coordinate.
     midspan_z, midspan_y : (column,)
-        Motion of the girder axis at midspan per unit coordinate.
+        Motion of the middle span's girder axis at midspan per unit coordinate.
     basis : (dof, coordinate)
         Motion of the finite-element model per unit coordinate.
     """
 
     parameters: Guideway
     n_modes: int
-    span_coordinates: npt.NDArray[np.int64]
+    span_coordinates: tuple[npt.NDArray[np.int64], ...]
     top_mass: Array
-    stiffness: sp.csr_matrix
-    damping: sp.csr_matrix
-    rail_z: Array
-    rail_roll: Array
-    rail_y: Array
+    stiffness: sp.csr_array
+    carried: sp.csr_array
+    relative_damping: sp.csr_array
+    rail_z: tuple[Array, ...]
+    rail_roll: tuple[Array, ...]
+    rail_y: tuple[Array, ...]
     midspan_z: Array
     midspan_y: Array
-    basis: sp.csr_matrix
+    basis: sp.csr_array
 
     @property
     def n_coordinates(self) -> int:
@@ -75,9 +77,23 @@ class ReducedGuideway:
         return int(self.stiffness.shape[0])
 
     @property
-    def mass(self) -> sp.csr_matrix:
+    def mass(self) -> sp.csr_array:
         """Mass matrix (coordinate, coordinate)."""
-        return sp.block_diag([sp.eye(self.n_modes), self.top_mass], format="csr")
+        return sp.block_diag([sp.eye_array(self.n_modes), self.top_mass], format="csr")
+
+    @property
+    def relative(self) -> sp.csr_array:
+        """Relative rates per unit rate of the coordinates (coordinate, coordinate)."""
+        n_tops = self.n_coordinates - self.n_modes
+        return sp.block_array(
+            [[sp.eye_array(self.n_modes), -self.carried], [None, sp.eye_array(n_tops)]],
+            format="csr",
+        )
+
+    @property
+    def damping(self) -> sp.csr_array:
+        """Damping matrix (coordinate, coordinate)."""
+        return (self.relative.T @ self.relative_damping @ self.relative).tocsr()
 
 
 def spline_weights(u: Array) -> Array:
@@ -101,7 +117,9 @@ def spline_weights(u: Array) -> Array:
     return np.stack([v**3, 3 * u**3 - 6 * u**2 + 4, 3 * v**3 - 6 * v**2 + 4, u**3], axis=-1) / 6.0
 
 
-def reduce(model: full.GuidewayModel, cutoff: float) -> ReducedGuideway:
+def reduce(
+    model: full.GuidewayModel, cutoff: float, cutoff_elsewhere: float | None = None
+) -> ReducedGuideway:
     """Bring the finite-element guideway to component coordinates.
 
     Parameters
@@ -109,8 +127,11 @@ def reduce(model: full.GuidewayModel, cutoff: float) -> ReducedGuideway:
     model
         Finite-element guideway.
     cutoff
-        Highest component frequency that is kept, and the frequency up to which damping is a
+        Highest mode of the middle span that is kept, and the frequency up to which damping is a
         share of critical [Hz].
+    cutoff_elsewhere
+        Highest mode of the piers and the other spans, whose own motion nobody asks for [Hz];
+        ``None``: as in the middle span.
 
     Returns
     -------
@@ -119,186 +140,140 @@ def reduce(model: full.GuidewayModel, cutoff: float) -> ReducedGuideway:
 
     References
     ----------
-    Craig, Bampton, AIAA J. 6(7):1313-1319 (1968).
+    Craig, Bampton, AIAA J. 6(7):1313-1319 (1968); docs/theory/integration.md.
     """
-    basis, n_modes, columns = _basis(model, cutoff)
-    mass = (basis.T @ model.mass @ basis).tocsr()
-    stiffness = _pruned((basis.T @ model.stiffness @ basis).tocsr())
-    rail_z, rail_roll, rail_y = _rail_splines(model, basis, columns[0])
+    if cutoff_elsewhere is None:
+        cutoff_elsewhere = cutoff
     n_spans, length = model.parameters.n_spans, model.parameters.span_length
     middle = n_spans // 2
+    kinds = [1 if j == middle else 0 for j in range(n_spans)]
+    cutoffs = (cutoff_elsewhere, cutoff)
+    basis, carried, columns = _basis(model, kinds, cutoffs)
+    n_modes = carried.shape[0]
+    mass = (basis.T @ model.mass @ basis).tocsr()
+    splines = {kind: _rail_splines(model, basis, j, columns[j]) for j, kind in enumerate(kinds)}
     at_midspan = [
         (rows @ basis[:, columns[middle]]).toarray().ravel()
         for rows in model.girder_rows(np.array([(middle + 0.5) * length]))
     ]
-    return ReducedGuideway(
+    stiffness = _pruned((basis.T @ model.stiffness @ basis).tocsr(), 1e-12)
+    reduced = ReducedGuideway(
         parameters=model.parameters,
         n_modes=n_modes,
-        span_coordinates=columns,
+        span_coordinates=tuple(columns),
         top_mass=mass[n_modes:, n_modes:].toarray(),
         stiffness=stiffness,
-        damping=_damping(model, basis, n_modes, columns, cutoff),
-        rail_z=rail_z,
-        rail_roll=rail_roll,
-        rail_y=rail_y,
+        carried=carried,
+        relative_damping=sp.csr_array(stiffness.shape),
+        rail_z=tuple(splines[kind][0] for kind in kinds),
+        rail_roll=tuple(splines[kind][1] for kind in kinds),
+        rail_y=tuple(splines[kind][2] for kind in kinds),
         midspan_z=at_midspan[0],
         midspan_y=at_midspan[1],
         basis=basis,
     )
+    bearings = (basis.T @ model.bearing_damping @ basis).toarray()
+    return replace(reduced, relative_damping=_relative_damping(reduced, bearings, cutoff))
 
 
-def _component_modes(
-    model: full.GuidewayModel, dof: npt.NDArray[np.int64], cutoff: float
-) -> tuple[Array, Array]:
-    """Modes of the component ``dof`` with everything else held, and its circular frequencies."""
+def _component_modes(model: full.GuidewayModel, dof: npt.NDArray[np.int64], cutoff: float) -> Array:
+    """Modes of the component ``dof`` with everything else held."""
     stiffness = model.stiffness[dof][:, dof].toarray()
     mass = model.mass[dof][:, dof].toarray()
     limit = (2 * np.pi * cutoff) ** 2
-    squares, shapes = scipy.linalg.eigh(stiffness, mass, subset_by_value=(-np.inf, limit))
+    _, shapes = scipy.linalg.eigh(stiffness, mass, subset_by_value=(-np.inf, limit))
+    if shapes.shape[1] == 0:
+        return shapes
     peaks = np.abs(shapes).argmax(axis=0)
-    signs = np.sign(shapes[peaks, np.arange(shapes.shape[1])])
-    return shapes * signs, np.sqrt(squares)
+    return shapes * np.sign(shapes[peaks, np.arange(shapes.shape[1])])
 
 
 def _basis(
-    model: full.GuidewayModel, cutoff: float
-) -> tuple[sp.csr_matrix, int, npt.NDArray[np.int64]]:
+    model: full.GuidewayModel, kinds: list[int], cutoffs: tuple[float, float]
+) -> tuple[sp.csr_array, sp.csr_array, list[npt.NDArray[np.int64]]]:
+    """Shapes of all coordinates, what the modes take along, and the columns of each span."""
     n_dof = model.mass.shape[0]
     tops = model.pier_top_dof.reshape(-1)
-    components = [*model.span_dof, *model.pier_dof]
-    modes: dict[int, Array] = {}  # by the component's kind: all spans are alike, and all piers
-    solved: dict[int, Array] = {}
-    blocks, rows, cols = [], [], []
-    interface = sp.lil_matrix((n_dof, tops.size))
-    interface[tops, np.arange(tops.size)] = 1.0
-    interface = interface.tocsr()
-    static = sp.csr_matrix((n_dof, tops.size))
-    start = 0
-    n_span_modes = 0
-    for number, dof in enumerate(components):
-        kind = 0 if number < len(model.span_dof) else 1
-        if kind not in modes:
-            modes[kind] = _component_modes(model, dof, cutoff)[0]
-        shapes = modes[kind]
-        coupling = model.stiffness[dof][:, tops]
-        touched = np.unique(coupling.tocoo().col)
-        if kind not in solved:
-            inner = model.stiffness[dof][:, dof].toarray()
-            solved[kind] = -np.linalg.solve(inner, coupling[:, touched].toarray())
-        constraint = solved[kind]
-        # Take the component's own modes out of the constraint shapes: no mass coupling remains.
-        inertia = model.mass[dof][:, dof] @ constraint + model.mass[dof][:, tops[touched]]
-        constraint = constraint - shapes @ (shapes.T @ inertia)
-        grid = np.meshgrid(dof, touched, indexing="ij")
-        static = static + sp.csr_matrix(
-            (constraint.ravel(), (grid[0].ravel(), grid[1].ravel())), shape=static.shape
+    parts = [(dof, ("span", kind)) for dof, kind in zip(model.span_dof, kinds, strict=True)]
+    parts += [(dof, ("pier", 0)) for dof in model.pier_dof]
+    modes: dict[tuple[str, int], Array] = {}  # all parts of a kind are alike
+    constraints: dict[tuple[str, int], Array] = {}
+    modal, static, carried = [], [], []
+    for dof, kind in parts:
+        coupling = model.stiffness[dof][:, tops].tocsr()
+        touched = np.unique(coupling.indices)
+        to_tops = sp.csr_array(
+            (np.ones(touched.size), (np.arange(touched.size), touched)),
+            shape=(touched.size, tops.size),
         )
-        n = shapes.shape[1]
-        grid = np.meshgrid(dof, np.arange(start, start + n), indexing="ij")
-        blocks.append(shapes.ravel())
-        rows.append(grid[0].ravel())
-        cols.append(grid[1].ravel())
+        place = sp.csr_array(
+            (np.ones(dof.size), (dof, np.arange(dof.size))), shape=(n_dof, dof.size)
+        )
+        if kind not in modes:
+            modes[kind] = _component_modes(model, dof, cutoffs[kind[1]])
+            inner = model.stiffness[dof][:, dof].toarray()
+            constraints[kind] = -np.linalg.solve(inner, coupling[:, touched].toarray())
+        shapes, constraint = modes[kind], constraints[kind]
+        inertia = model.mass[dof][:, dof] @ constraint + model.mass[dof][:, tops[touched]]
+        share = shapes.T @ inertia
+        modal.append(place @ sp.csr_array(shapes))
+        static.append(place @ sp.csr_array(constraint - shapes @ share) @ to_tops)
+        carried.append(sp.csr_array(share) @ to_tops)
+    interface = sp.csr_array(
+        (np.ones(tops.size), (tops, np.arange(tops.size))), shape=(n_dof, tops.size)
+    )
+    basis = sp.hstack([*modal, sum(static, interface)]).tocsr()
+    n_modes = sum(part.shape[1] for part in modal)
+    columns, start = [], 0
+    for j in range(len(kinds)):
+        n = modal[j].shape[1]
+        own = np.arange(start, start + n)
+        columns.append(np.concatenate([own, n_modes + 6 * j + np.arange(12)]))
         start += n
-        if kind == 0:
-            n_span_modes = n
-    modal = sp.csr_matrix(
-        (np.concatenate(blocks), (np.concatenate(rows), np.concatenate(cols))),
-        shape=(n_dof, start),
-    )
-    basis = sp.hstack([modal, interface + static]).tocsr()
-    n_spans = model.parameters.n_spans
-    columns = np.array(
-        [
-            [
-                *range(j * n_span_modes, (j + 1) * n_span_modes),
-                *range(start + 6 * j, start + 6 * j + 12),
-            ]
-            for j in range(n_spans)
-        ]
-    )
-    return basis, start, columns
+    return basis, _pruned_to(sp.vstack(carried).tocsr(), 1e-12), columns
 
 
-def _pruned(matrix: sp.csr_matrix, drop: float = 1e-12) -> sp.csr_matrix:
-    """Drop what rounding left: entries below ``drop`` times the root of their diagonals."""
+def _pruned(matrix: sp.csr_array, drop: float) -> sp.csr_array:
+    """Drop entries below ``drop`` times the root of their diagonals."""
     coo = matrix.tocoo()
     scale = np.sqrt(np.abs(matrix.diagonal()))
     keep = np.abs(coo.data) > drop * scale[coo.row] * scale[coo.col]
-    return sp.csr_matrix((coo.data[keep], (coo.row[keep], coo.col[keep])), shape=matrix.shape)
+    keep |= coo.row == coo.col
+    return sp.csr_array((coo.data[keep], (coo.row[keep], coo.col[keep])), shape=matrix.shape)
 
 
-def _damping(
-    model: full.GuidewayModel,
-    basis: sp.csr_matrix,
-    n_modes: int,
-    columns: npt.NDArray[np.int64],
-    cutoff: float,
-) -> sp.csr_matrix:
-    n_spans = model.parameters.n_spans
-    if n_spans <= DAMPING_SPANS:
-        return _exact_damping(model, basis, cutoff)
-    short_model = full.build(model.parameters.model_copy(update={"n_spans": DAMPING_SPANS}))
-    short_basis, short_modes, short_columns = _basis(short_model, cutoff)
-    short = _exact_damping(short_model, short_basis, cutoff).tocoo()
-    # Which component (span, pier, pier top) each coordinate of the short line belongs to.
-    n = columns.shape[1] - 12
-    short_place = _places(short_columns, short_modes, n, DAMPING_SPANS)
-    place = _places(columns, n_modes, n, n_spans)
-    lookup = {tuple(p): i for i, p in enumerate(place)}
-    half = DAMPING_SPANS // 2
-    data: dict[tuple[int, int], float] = {}
-    for i, j, value in zip(short.row, short.col, short.data, strict=True):
-        (kind_i, at_i, k_i), (kind_j, at_j, k_j) = short_place[i], short_place[j]
-        last = DAMPING_SPANS if kind_i else DAMPING_SPANS - 1
-        if at_i < half:
-            targets = [0]
-        elif last - at_i < half:
-            targets = [n_spans - DAMPING_SPANS]
-        elif at_i == half:
-            targets = list(range(n_spans - DAMPING_SPANS + 1))
-        else:
-            targets = [n_spans - DAMPING_SPANS]
-        for shift in targets:
-            row = lookup.get((kind_i, at_i + shift, k_i))
-            col = lookup.get((kind_j, at_j + shift, k_j))
-            if row is not None and col is not None:
-                data[row, col] = value
-    index = np.array(list(data))
-    matrix = sp.csr_matrix(
-        (np.array(list(data.values())), (index[:, 0], index[:, 1])), shape=(basis.shape[1],) * 2
-    )
-    return ((matrix + matrix.T) / 2).tocsr()
+def _pruned_to(matrix: sp.csr_array, drop: float) -> sp.csr_array:
+    """Drop entries below ``drop`` times the largest of their column."""
+    coo = matrix.tocoo()
+    largest = np.abs(matrix).max(axis=0).toarray().ravel()
+    keep = np.abs(coo.data) > drop * largest[coo.col]
+    return sp.csr_array((coo.data[keep], (coo.row[keep], coo.col[keep])), shape=matrix.shape)
 
 
-def _places(
-    columns: npt.NDArray[np.int64], n_modes: int, n_span_modes: int, n_spans: int
-) -> list[tuple[int, int, int]]:
-    """(kind, number along the line, index within) of every coordinate."""
-    places = [(0, j, k) for j in range(n_spans) for k in range(n_span_modes)]
-    n_pier_modes = (n_modes - n_spans * n_span_modes) // (n_spans + 1)
-    places += [(1, j, k) for j in range(n_spans + 1) for k in range(n_pier_modes)]
-    places += [(2, j, k) for j in range(n_spans + 1) for k in range(6)]
-    return places
+def _relative_damping(reduced: ReducedGuideway, bearings: Array, cutoff: float) -> sp.csr_array:
+    """A set share of critical in every mode up to the cut-off, its absolute rate beyond.
 
-
-def _exact_damping(model: full.GuidewayModel, basis: sp.csr_matrix, cutoff: float) -> sp.csr_matrix:
-    """A set share of critical in every mode up to the cut-off, its absolute rate beyond."""
-    mass = (basis.T @ model.mass @ basis).toarray()
-    stiffness = (basis.T @ model.stiffness @ basis).toarray()
-    squares, shapes = scipy.linalg.eigh(stiffness, mass)
+    Acts on relative rates, where the matrix is closest to its diagonal.
+    """
+    mass = reduced.mass.toarray()
+    squares, shapes = scipy.linalg.eigh(reduced.stiffness.toarray(), mass)
     omega = np.sqrt(np.maximum(squares, 0.0))
-    ratio, corner = model.parameters.damping_ratio, 2 * np.pi * cutoff
-    rates = 2 * ratio * np.minimum(omega, corner)
+    rates = 2 * reduced.parameters.damping_ratio * np.minimum(omega, 2 * np.pi * cutoff)
     weighted = mass @ shapes
-    damping = (weighted * rates) @ weighted.T
-    damping += (basis.T @ model.bearing_damping @ basis).toarray()
-    damping = (damping + damping.T) / 2
-    return _pruned(sp.csr_matrix(damping), DAMPING_DROP)
+    damping = (weighted * rates) @ weighted.T + bearings
+    absolute = np.eye(mass.shape[0])
+    absolute[: reduced.n_modes, reduced.n_modes :] = reduced.carried.toarray()
+    relative = absolute.T @ damping @ absolute
+    return _pruned(sp.csr_array((relative + relative.T) / 2), DAMPING_DROP)
 
 
 def _rail_splines(
-    model: full.GuidewayModel, basis: sp.csr_matrix, columns: npt.NDArray[np.int64]
+    model: full.GuidewayModel,
+    basis: sp.csr_array,
+    span: int,
+    columns: npt.NDArray[np.int64],
 ) -> tuple[Array, Array, Array]:
+    """Coefficients (column, coefficient) of the rails' z, roll and y along one span."""
     length = model.parameters.span_length
     n = SPLINE_INTERVALS
     x = (np.arange(24 * n) + 0.5) * (length / (24 * n))
@@ -307,10 +282,10 @@ def _rail_splines(
     weights = spline_weights(x / length * n - interval)
     np.put_along_axis(design, interval[:, None] + np.arange(4), weights, axis=1)
     fit = np.linalg.pinv(design)
-    sides = []
-    for side in (1, -1):
-        rows = model.rail_rows(x, side)
-        sides.append([(rows[k] @ basis[:, columns]).toarray() for k in (0, 2)])
-    (right_z, right_y), (left_z, left_y) = sides
-    z, roll, y = (right_z + left_z) / 2, (right_z - left_z) / 2, (right_y + left_y) / 2
-    return fit @ z, fit @ roll, fit @ y
+    right_z, _, right_y, _ = model.rail_rows(span * length + x, 1)
+    left_z, _, left_y, _ = model.rail_rows(span * length + x, -1)
+    shapes = basis[:, columns].toarray()
+    z = (right_z + left_z) @ shapes / 2
+    roll = (right_z - left_z) @ shapes / 2
+    y = (right_y + left_y) @ shapes / 2
+    return (fit @ z).T, (fit @ roll).T, (fit @ y).T
