@@ -122,7 +122,7 @@ def absorb(
 
     References
     ----------
-    Mo et al., Water Resour. Res. 53 (2017) 10802–10823, sec. 2.4; docs/theory/adaptive_sampling.md.
+    Mo et al., Water Resour. Res. 53 (2017) 10802–10823; docs/theory/adaptive_sampling.md, sec. 3.
     """
     n_parameters, n_responses = state.points.shape[1], state.values.shape[1]
     points = checked_points(points, n_parameters)

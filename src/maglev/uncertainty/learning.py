@@ -68,7 +68,7 @@ def taylor_scores(
 
     References
     ----------
-    Mo et al., Water Resour. Res. 53 (2017) 10802–10823, sec. 2.3.
+    Mo et al., Water Resour. Res. 53 (2017) 10802–10823; docs/theory/adaptive_sampling.md, sec. 1.
     """
     distance, remainder = np.asarray(distance, float), np.asarray(remainder, float)
     _check_aggregate(aggregate)
@@ -109,7 +109,7 @@ def taylor_remainder(surrogate: Surrogate, candidates: npt.ArrayLike) -> Array:
 
     References
     ----------
-    Mo et al., Water Resour. Res. 53 (2017) 10802–10823, sec. 2.3.
+    Mo et al., Water Resour. Res. 53 (2017) 10802–10823; docs/theory/adaptive_sampling.md, sec. 1.
     """
     candidates = checked_points(candidates, surrogate.points.shape[1])
     nearest = cKDTree(surrogate.points).query(candidates)[1]
@@ -160,7 +160,7 @@ def taylor_batch(
 
     References
     ----------
-    Mo et al., Water Resour. Res. 53 (2017) 10802–10823, sec. 2.3 and 2.4.
+    Mo et al., Water Resour. Res. 53 (2017) 10802–10823; docs/theory/adaptive_sampling.md, sec. 1.
     """
     occupied, candidates, held, distance = _checked(
         surrogate, occupied, candidates, n_new, held_probability

@@ -146,7 +146,7 @@ class RBF:
 
         References
         ----------
-        Rippa, Adv. Comput. Math. 11 (1999) 193–210, eq. 13.
+        Rippa, Adv. Comput. Math. 11 (1999) 193–210; docs/theory/surrogates.md, eq. 4.
         """
         return _leave_one_out(self.points, self.weights, self.inverse_diagonal)
 
