@@ -20,7 +20,7 @@ from maglev.parameters import Gains, Train
 REFERENCE = Path(__file__).parents[1] / "reference"
 STORED = json.loads((REFERENCE / "multibody.json").read_text())
 CASES = {"one_car": 1, "two_cars": 2}
-TOLERANCE = 1e-3  # of a frequency or force; the two programs differ by less than 1e-9
+TOLERANCE = 1e-4  # of a frequency or force; the two programs differ by less than 1e-5
 
 
 @pytest.fixture(scope="module")
