@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from maglev.mechanics.train import build, pole_offsets, pole_static_force
-from maglev.parameters import GRAVITY, Gains, Train
+from maglev.parameters import GRAVITY, Gains, Rod, Train
 
 FIVE_CARS = build(Train())
 TWO_CARS = build(Train(n_cars=2))
@@ -109,6 +109,7 @@ def test_magnets_balance_the_weight_and_its_moments(n_cars):
     x, y = magnets.x[held], magnets.side[held] * 1.1
     weight = GRAVITY * (n_cars * (39_000 + 4 * 2200 + 16 * 50) + (16 * n_cars - 2) * 600)
     assert_allclose(force.sum(), weight, rtol=1e-12)
+    assert_allclose(model.weight.sum(), weight, rtol=1e-12)
     middle = -0.5 * n_cars * 24.768  # the train is the same seen from either end
     assert_allclose((force * x + moment).sum(), weight * middle, rtol=1e-12)
     assert_allclose((force * y).sum(), 0, atol=1e-9 * weight)
@@ -174,13 +175,15 @@ def test_lifting_shifting_pitching_or_yawing_the_whole_train_strains_nothing():
         assert np.abs(strain).max() < NO_GAP * np.abs(motion).max(), name
 
 
-def test_rolling_the_whole_train_lifts_its_bodies_on_their_rods_and_nothing_else():
-    places = np.array([place(dof) for dof in FIVE_CARS.dof_names])
-    motion = 1.0 * direction(FIVE_CARS, "phi")
-    motion += direction(FIVE_CARS, "z") * places[:, 1] - direction(FIVE_CARS, "y") * places[:, 2]
+@pytest.mark.parametrize("pivot_z", ["-0.5 m", "-0.2 m"])
+def test_rolling_the_whole_train_lifts_its_bodies_on_their_rods_and_nothing_else(pivot_z):
+    model = build(Train(rod=Rod(pivot_z=pivot_z)))
+    places = np.array([place(dof) for dof in model.dof_names])
+    motion = 1.0 * direction(model, "phi")
+    motion += direction(model, "z") * places[:, 1] - direction(model, "y") * places[:, 2]
     moment = 5 * 39_000 * GRAVITY * 0.5  # five pendulums of the body's weight, 0.5 m long
-    assert_allclose(motion @ FIVE_CARS.stiffness @ motion, moment, rtol=1e-9)
-    assert abs(motion @ FIVE_CARS.damping @ motion) < 1e-9
+    assert_allclose(motion @ model.stiffness @ motion, moment, rtol=1e-9)
+    assert abs(motion @ model.damping @ motion) < 1e-9
 
 
 def test_car_body_hangs_sideways_on_its_rods_like_a_pendulum():
