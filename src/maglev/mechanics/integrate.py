@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
-import scipy.signal
 import scipy.sparse as sp
 
 from maglev.mechanics import guideway as guideway_model
@@ -26,21 +25,15 @@ from maglev.mechanics._kernels import (
     Vehicle,
     passage,
 )
+from maglev.mechanics.course import n_steps, time_step, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import SPLINE_INTERVALS, ReducedGuideway, reduce
-from maglev.parameters import Config, Magnet, Passage
+from maglev.mechanics.responses import Passages, acceleration_filter, checked_gains
+from maglev.parameters import Config, Magnet
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-
-GIRDER_RESPONSES = (
-    "girder_displacement_z",
-    "girder_displacement_y",
-    "girder_acceleration_z",
-    "girder_acceleration_y",
-)
-"""The responses of midspan, in the order of the kernels' rows."""
 
 
 @dataclass(frozen=True)
@@ -54,66 +47,7 @@ class System:
     guidance: MagnetRows
     line: Line
     track: Track
-    passage: Passage
-
-
-@dataclass(frozen=True)
-class Passages:
-    """What the passages left behind; girder responses in the order of `GIRDER_RESPONSES`.
-
-    Attributes
-    ----------
-    girder, girder_time : (sample, response)
-        Largest absolute value [m, m/s²] and when it occurred [s].
-    body_z, body_y, body_z_time, body_y_time : (sample, car)
-        Largest absolute acceleration of each car body [m/s²] and when it occurred [s].
-    gap_min, gap_max, current_max : (sample, kind)
-        Of suspension and guidance [m, m, A].
-    status : (sample,)
-        How the passage ended; see `maglev.mechanics._kernels`.
-    lost_time : (sample,)
-        When levitation was lost [s]; NaN where it was not.
-    lost_magnet : (sample,)
-        Where, in the train's table of magnets; -1 where it was not.
-    time : (record,)
-        Elapsed time of the recorded steps [s].
-    girder_history : (sample, response, record)
-    body_z_history, body_y_history : (sample, car, record)
-    gap_history, current_history : (sample, magnet, record)
-        Mean gap of each magnet's poles [m] and mean current [A].
-    """
-
-    girder: Array
-    girder_time: Array
-    body_z: Array
-    body_y: Array
-    body_z_time: Array
-    body_y_time: Array
-    gap_min: Array
-    gap_max: Array
-    current_max: Array
-    status: npt.NDArray[np.int64]
-    lost_time: Array
-    lost_magnet: npt.NDArray[np.int64]
-    time: Array
-    girder_history: Array
-    body_z_history: Array
-    body_y_history: Array
-    gap_history: Array
-    current_history: Array
-
-
-def track_range(config: Config) -> tuple[float, float]:
-    """First and last place any pole visits during a passage [m], the first pier at zero."""
-    length = config.train.length
-    margin = config.train.car_pitch  # room for the poles ahead of the first magnet's centre
-    return -config.passage.approach - length - margin, config.guideway.length + length + margin
-
-
-def n_steps(config: Config) -> int:
-    """Number of time steps from the start until the tail has left the last span [-]."""
-    way = config.passage.approach + config.guideway.length + config.train.length
-    return math.ceil(way / config.passage.speed / config.passage.time_step)
+    config: Config
 
 
 def prepare(config: Config, profile: Profile) -> System:
@@ -143,10 +77,10 @@ def prepare(config: Config, profile: Profile) -> System:
         config.passage.mode_cutoff_elsewhere,
     )
     limit = stability_limit(config, train, reduced)
-    if not config.passage.time_step < limit:
+    if not time_step(config) < limit:
         raise ValueError(
             f"passage.time_step must be below the stability limit of {limit * 1e3:.3g} ms, "
-            f"got {config.passage.time_step * 1e3:.3g} ms; take a smaller step or lower "
+            f"got {time_step(config) * 1e3:.3g} ms; take a smaller step or lower "
             "passage.mode_cutoff"
         )
     start, stop = track_range(config)
@@ -162,14 +96,14 @@ def prepare(config: Config, profile: Profile) -> System:
         vehicle=_vehicle(train),
         suspension=_magnet_rows(train, guidance=False),
         guidance=_magnet_rows(train, guidance=True),
-        line=_line(reduced, config.passage.time_step),
+        line=_line(reduced, time_step(config)),
         track=Track(
             profile.x0,
             profile.dx,
             np.ascontiguousarray(profile.values),
             np.ascontiguousarray(profile.slopes),
         ),
-        passage=config.passage,
+        config=config,
     )
 
 
@@ -214,7 +148,7 @@ def integrate(
     padded = np.empty((n_rows * LANES, 4))
     padded[:n_samples] = gains
     padded[n_samples:] = gains[-1]
-    run = _run(system, record_every)
+    run = _run(system.config, record_every)
 
     def one_row(row: int) -> Outcome:
         outcome = _empty_outcome(system, run)
@@ -238,29 +172,6 @@ def integrate(
     return _gathered(outcomes, n_samples, system, run)
 
 
-def checked_gains(gains: npt.ArrayLike) -> Array:
-    """Return the gains as (sample, 4) doubles.
-
-    Raises
-    ------
-    ValueError
-        If they have another shape, are empty, negative or not finite.
-    """
-    array = np.asarray(gains, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 4:
-        hint = "; transpose them" if array.ndim == 2 and array.shape[0] == 4 else ""
-        raise ValueError(f"gains have shape {array.shape}, expected (sample, 4){hint}")
-    if array.shape[0] == 0:
-        raise ValueError("gains have no sample, expected at least one row")
-    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if bad.size:
-        raise ValueError(
-            f"gains must be finite, got {array[bad[0]].tolist()} at sample {bad[0]}"
-            + (f" and {bad.size - 1} more" if bad.size > 1 else "")
-        )
-    return array
-
-
 def stability_limit(
     config: Config, train: train_model.TrainModel, reduced: ReducedGuideway
 ) -> float:
@@ -270,7 +181,7 @@ def stability_limit(
     at the mean gains.  A mode of circular frequency ω and damping ratio ζ is stable for
     ωΔt < 2(√(1 + ζ²) − ζ) (docs/theory/integration.md).
     """
-    ratio, dt = config.guideway.damping_ratio, config.passage.time_step
+    ratio, dt = config.guideway.damping_ratio, time_step(config)
     damped = math.sqrt(1 + ratio**2) - ratio
     mass = reduced.mass.toarray()
     mass[np.diag_indices(reduced.n_modes)] /= step_response(reduced, dt)[: reduced.n_modes]
@@ -473,37 +384,16 @@ def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, Array]:
     return rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data
 
 
-def acceleration_filter(passage: Passage) -> tuple[Array, Array]:
-    """Coefficients (b, a) of the low-pass on guideway accelerations; the identity without a band.
-
-    Raises
-    ------
-    ValueError
-        If the band reaches half the sampling rate.
-    """
-    if passage.acceleration_band is None:
-        return np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
-    rate = 1 / passage.time_step
-    if not passage.acceleration_band < rate / 2:
-        raise ValueError(
-            f"passage.acceleration_band must be below half the sampling rate, {rate / 2:g} Hz, "
-            f"got {passage.acceleration_band:g} Hz"
-        )
-    b, a = scipy.signal.butter(2, passage.acceleration_band, fs=rate)
-    return np.asarray(b), np.asarray(a)
-
-
-def _run(system: System, record_every: int) -> Run:
-    passage = system.passage
-    b, a = acceleration_filter(passage)
-    length = system.train.parameters.length
-    way = passage.approach + system.reduced.parameters.length + length
+def _run(config: Config, record_every: int) -> Run:
+    passage = config.passage
+    dt = time_step(config)
+    b, a = acceleration_filter(passage.acceleration_band, dt)
     return Run(
-        n_steps=math.ceil(way / passage.speed / passage.time_step),
-        time_step=passage.time_step,
+        n_steps=n_steps(config),
+        time_step=dt,
         speed=passage.speed,
         start=-passage.approach,
-        train_length=length,
+        train_length=config.train.length,
         gap_contact=passage.gap_contact,
         gap_lost=passage.gap_lost,
         filter_b=b,

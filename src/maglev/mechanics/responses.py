@@ -1,0 +1,121 @@
+"""Which motions are reported, in which band, and what a set of passages leaves behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.signal
+
+Array = npt.NDArray[np.float64]
+
+GIRDER_RESPONSES = (
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+)
+"""The responses of midspan, in the order of the ``response`` axis."""
+
+
+@dataclass(frozen=True)
+class Passages:
+    """What a set of passages left behind; girder responses in the order of `GIRDER_RESPONSES`.
+
+    Attributes
+    ----------
+    girder, girder_time : (sample, response)
+        Largest absolute value [m, m/s²] and when it occurred [s]; NaN where levitation was lost.
+    body_z, body_y, body_z_time, body_y_time : (sample, car)
+        Largest absolute acceleration of each car body [m/s²] and when it occurred [s]; likewise.
+    gap_min, gap_max, current_max : (sample, kind)
+        Of suspension and guidance [m, m, A].
+    status : (sample,)
+        How the passage ended: 0 completed, 1 contact, 2 gap lost, 3 not finite.
+    lost_time : (sample,)
+        When levitation was lost [s]; NaN where it was not.
+    lost_magnet : (sample,)
+        Where, in the train's table of magnets; -1 where it was not.
+    time : (record,)
+        Elapsed time of the recorded steps [s].
+    girder_history : (sample, response, record)
+    body_z_history, body_y_history : (sample, car, record)
+    gap_history, current_history : (sample, magnet, record)
+        Mean gap of each magnet's poles [m] and mean current [A].
+    """
+
+    girder: Array
+    girder_time: Array
+    body_z: Array
+    body_y: Array
+    body_z_time: Array
+    body_y_time: Array
+    gap_min: Array
+    gap_max: Array
+    current_max: Array
+    status: npt.NDArray[np.int64]
+    lost_time: Array
+    lost_magnet: npt.NDArray[np.int64]
+    time: Array
+    girder_history: Array
+    body_z_history: Array
+    body_y_history: Array
+    gap_history: Array
+    current_history: Array
+
+
+def checked_gains(gains: npt.ArrayLike) -> Array:
+    """Return the gains as (sample, 4) doubles.
+
+    Parameters
+    ----------
+    gains : (sample, 4)
+        Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d.
+
+    Raises
+    ------
+    ValueError
+        If they have another shape, no sample, or a value that is not finite.
+    """
+    array = np.asarray(gains, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 4:
+        hint = "; transpose them" if array.ndim == 2 and array.shape[0] == 4 else ""
+        raise ValueError(
+            f"gains have shape {array.shape}, expected (sample, gain) = (any, 4){hint}"
+        )
+    if array.shape[0] == 0:
+        raise ValueError("gains have no sample, expected at least one row")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if bad.size:
+        raise ValueError(
+            f"gains must be finite, got {array[bad[0]].tolist()} at sample {bad[0]}"
+            + (f" and {bad.size - 1} more such samples" if bad.size > 1 else "")
+        )
+    return array
+
+
+def acceleration_filter(band: float | None, time_step: float) -> tuple[Array, Array]:
+    """Coefficients (b, a) of the low-pass on guideway accelerations; the identity without a band.
+
+    Parameters
+    ----------
+    band
+        Corner of the second-order Butterworth low-pass [Hz], or ``None``.
+    time_step
+        Δt [s].
+
+    Raises
+    ------
+    ValueError
+        If the band reaches half the sampling rate.
+    """
+    if band is None:
+        return np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
+    if not band < 0.5 / time_step:
+        raise ValueError(
+            "passage.acceleration_band must be below half the sampling rate, "
+            f"{0.5 / time_step:g} Hz, got {band:g} Hz"
+        )
+    b, a = scipy.signal.butter(2, band, fs=1 / time_step)
+    return np.asarray(b), np.asarray(a)
