@@ -55,12 +55,9 @@ def main(traceback: bool) -> None:
 @click.argument("paths", type=_File, nargs=-1)
 def config(paths: tuple[Path, ...]) -> None:
     """Check configuration files and print all values that result, in SI."""
-    import yaml
+    from maglev.config import config_text, load_config
 
-    from maglev.config import load_config
-
-    values = load_config(*paths).quantities()
-    click.echo(yaml.safe_dump(values, sort_keys=False, allow_unicode=True), nl=False)
+    click.echo(config_text(load_config(*paths).quantities()), nl=False)
 
 
 @main.command()

@@ -192,12 +192,24 @@ def load_config(*paths: str | Path) -> Config:
     return from_mapping(mapping)
 
 
-def write_config(config: Config, path: str | Path) -> None:
-    """Write every value with its unit, so that `load_config` of the file gives the same again."""
-    path = Path(path)
-    mapping = rebase(config.quantities(), old=".", new=path.parent)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(yaml.safe_dump(mapping, sort_keys=False, allow_unicode=True), encoding="utf-8")
+def config_text(mapping: Mapping[str, Any], directory: str | Path = ".") -> str:
+    """Text of a configuration file that is to lie in a directory.
+
+    Parameters
+    ----------
+    mapping
+        All or some of the values, as `Config.quantities` gives them; names of files in it are
+        relative to the current directory.
+    directory
+        Where the file will lie.
+
+    Returns
+    -------
+    text
+        YAML, from which `load_config` reads the same values again.
+    """
+    moved = rebase(mapping, old=".", new=directory)
+    return yaml.safe_dump(moved, sort_keys=False, allow_unicode=True)
 
 
 def _shown(value: Any) -> str:

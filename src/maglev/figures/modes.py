@@ -9,21 +9,22 @@ from matplotlib.figure import Figure
 from maglev.datasets import VARIABLES
 from maglev.figures import style
 
-_N_SHAPES = 8
+_N_SHAPES, _PER_DIRECTION = 8, 3
 _APART = 1.5  # neighbouring modes of one direction are of one family below this ratio
 
 
 def _families(data: xr.Dataset) -> list[int]:
-    """Lowest mode of each family, a family being neighbours in frequency of one direction."""
+    """Lowest modes of the first families, neighbours in frequency of one direction being one."""
     lowest = []
     frequency, direction = data["frequency"].to_numpy(), data["direction"].to_numpy()
     for code in np.unique(direction):
-        below = 0.0
+        below, of_direction = 0.0, []
         for k in np.flatnonzero(direction == code):
             if frequency[k] > _APART * below:
-                lowest.append(int(k))
+                of_direction.append(int(k))
                 below = frequency[k]
-    return sorted(lowest)
+        lowest += of_direction[:_PER_DIRECTION]
+    return sorted(lowest)[:_N_SHAPES]
 
 
 def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
@@ -68,7 +69,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     top.legend(loc="upper right")
     top.set_title(f"(a) first vertical mode {first:.2f} Hz", loc="left")
 
-    chosen = _families(data)[:_N_SHAPES]
+    chosen = _families(data)
     for place, k in enumerate(chosen):
         axis = fig.add_subplot(grid[1 + place // 4, place % 4])
         mode = data.isel(mode=k)

@@ -38,14 +38,15 @@ def config_slice(config: Mapping[str, Any], stage: str) -> dict[str, Any]:
     Returns
     -------
     part
-        Value by dotted key.
+        Nested as in ``config``.
     """
     part: dict[str, Any] = {}
     for dotted in SECTIONS[stage]:
-        value: Any = config
-        for key in dotted.split("."):
-            value = value[key]
-        part[dotted] = value
+        *outer, last = dotted.split(".")
+        source, target = config, part
+        for key in outer:
+            source, target = source[key], target.setdefault(key, {})
+        target[last] = source[last]
     return part
 
 

@@ -39,8 +39,8 @@ def _spectrum(irregularity: Irregularity, values: np.ndarray) -> tuple[np.ndarra
     rate = _POINTS_PER_WAVELENGTH / irregularity.wavelength_min
     segment = round(_SEGMENT_LENGTH * irregularity.wavelength_max * rate)
     wavenumber, density = welch(values, fs=rate, nperseg=min(segment, values.size))
-    band = (wavenumber >= 1 / irregularity.wavelength_max) & (
-        wavenumber <= 1 / irregularity.wavelength_min
+    band = (wavenumber > 1 / irregularity.wavelength_max) & (
+        wavenumber < 1 / irregularity.wavelength_min
     )
     return wavenumber[band], density[band]
 

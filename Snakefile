@@ -1,0 +1,53 @@
+# From the configuration to the figures: `snakemake --cores 2 all`, or one figure by its name.
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+from snakemake.utils import min_version, validate
+
+from maglev.config import (
+    ConfigError,
+    config_text,
+    from_mapping,
+    overlay,
+    read_overlays,
+    rebase,
+)
+from maglev.fingerprint import code_of
+from maglev.stages import SECTIONS, config_slice
+
+min_version("9.0")
+
+# What was given with --configfile lies over config/config.yaml, or over the file that it extends;
+# names of files in it are relative to config/.
+try:
+    given = rebase(config, old="config", new=".")
+    base = Path("config", given.pop("extends", "config.yaml"))
+    parameters = from_mapping(overlay(read_overlays(base), given))
+except ConfigError as error:
+    raise WorkflowError(str(error)) from None
+config.clear()
+config.update(parameters.quantities())
+validate(config, "workflow/schemas/config.schema.yaml", set_default=False)
+
+
+pathvars:
+    results=f"results/{config['run']}",
+    logs=f"logs/{config['run']}",
+    benchmarks=f"benchmarks/results/{config['run']}",
+
+
+include: "workflow/rules/config.smk"
+include: "workflow/rules/track.smk"
+include: "workflow/rules/validation.smk"
+include: "workflow/rules/figures.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        rules.run_config.output,
+        rules.fig7.output,
+        rules.fig8.output,
+        rules.histories.output,
+        rules.gaps.output,
+        rules.modes.output,

@@ -1,0 +1,36 @@
+# The configuration as used: whole, and for each stage the part that it reads.  A stage depends on
+# the file with its part, which is rewritten only when one of its values changes.
+
+
+rule run_config:
+    output:
+        "<results>/run_config.yaml",
+    log:
+        "<logs>/run_config.log",
+    conda:
+        "../envs/maglev.yaml"
+    params:
+        text=config_text(config, f"results/{config['run']}"),
+    message:
+        "Write the configuration as used"
+    shell:
+        "printf %s {params.text:q} > {output} 2> {log}"
+
+
+rule stage_config:
+    output:
+        "<results>/config/{stage}.yaml",
+    log:
+        "<logs>/config/{stage}.log",
+    wildcard_constraints:
+        stage="|".join(SECTIONS),
+    conda:
+        "../envs/maglev.yaml"
+    params:
+        text=lambda wildcards: config_text(
+            config_slice(config, wildcards.stage), f"results/{config['run']}/config"
+        ),
+    message:
+        "Write what the stage '{wildcards.stage}' reads of the configuration"
+    shell:
+        "printf %s {params.text:q} > {output} 2> {log}"
