@@ -19,8 +19,6 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-import openturns as ot
-import openturns.experimental as otexp
 import xarray as xr
 from scipy.stats import norm, uniform
 
@@ -32,6 +30,12 @@ from maglev.uncertainty.learning import EXCEEDANCES, predicted_limits, tail_batc
 from maglev.uncertainty.pointset import gf_points, sobol_points
 from maglev.uncertainty.rbf import fit_rbf
 
+try:  # a development extra, not on every platform
+    import openturns as ot
+    import openturns.experimental as otexp
+except ImportError:
+    ot = None
+
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 PAGE = ROOT / "docs" / "benchmarks" / "designs.md"
@@ -42,6 +46,7 @@ N_POPULATION = 2**17  # 131 points beyond the limit at 1e-3, the same for truth 
 N_CANDIDATES = 2**14
 N_TAYLOR_CANDIDATES = 1000  # a GF point set, as Mo et al. take a space-filling one
 N_COUNTING = 2**17
+NOTICEABLE = 0.01  # a quarter of the noise that 10,000 plain samples leave in the limit at 1e-2
 
 Array = np.ndarray
 
@@ -250,9 +255,10 @@ DESIGNS = {
     "one-stage Kriging": partial(one_stage, fit=fit_kriging),
     "TEAD-RBF": partial(adaptive, fit=fit_rbf, **TAYLOR),
     "TEAD-Kriging": partial(adaptive, fit=fit_kriging, **TAYLOR),
-    "LOLA-Voronoi-Kriging": partial(lola_voronoi, fit=fit_kriging),
     "tail-Kriging": partial(adaptive, fit=fit_kriging, **TAIL),
 }
+if ot is not None:
+    DESIGNS["LOLA-Voronoi-Kriging"] = partial(lola_voronoi, fit=fit_kriging)
 
 
 COLUMNS = ("problem", "seed", "design", "calls", "lost", "exceedance", "error", "seconds")
@@ -355,9 +361,11 @@ def page(results: xr.Dataset, figure: Path) -> str:
         f"response: median / worst of {seeds} seeds.  Truth and surrogate are read off the same "
         f"{N_POPULATION} points, so the error is the surrogate's alone; adaptive designs start "
         f"from {N_FIRST} GF points and add {N_BATCH} at a time.  ∞: the estimated probability of "
-        f"loss exceeds the level.  The smallest median is bold.",
+        f"loss exceeds the level (a gap in the figure).  The smallest median is bold.",
         "",
         f"![error of the limits against calls]({figure.name})",
+        "",
+        "Lines with markers are medians, thin lines worst cases.",
         "",
     ]
     for name, problem in PROBLEMS.items():
@@ -386,8 +394,13 @@ def page(results: xr.Dataset, figure: Path) -> str:
                     cells.append(f"**{cell}**" if best and np.isfinite(median) else cell)
             lines.append(f"| {design} | " + " | ".join(cells) + " |")
         lines.append("")
-    lines += ["## Where the tail criterion does not win", ""]
-    lines += losses(results["error"]) or ["Nowhere, by the median."]
+    lines += [
+        "## Where the tail criterion does not win",
+        "",
+        f"By more than {NOTICEABLE:g} in the median:",
+        "",
+    ]
+    lines += losses(results["error"]) or ["nowhere."]
     last = results["seconds"].isel(calls=-1).median("seed").max("problem")
     lines += [
         "",
@@ -411,11 +424,12 @@ def losses(error: xr.DataArray) -> list[str]:
             for calls in list(CHECKED)[1:]:
                 here = middle.sel(problem=name, exceedance=level, calls=calls)
                 ours = float(here.sel(design="tail-Kriging"))
-                best = str(here["design"].values[int(here.argmin())])
-                if float(here.min()) < ours:
+                best = int(np.argmin(here.values))
+                if ours - here.values[best] > NOTICEABLE:
                     lines.append(
-                        f"- {PROBLEMS[name].title}, {level:g}, {calls} calls: {best} "
-                        f"{float(here.min()):.4f}, tail-Kriging {ours:.4f}"
+                        f"- {PROBLEMS[name].title}, {level:g}, {calls} calls: "
+                        f"{here['design'].values[best]} {number(here.values[best])}, "
+                        f"tail-Kriging {number(ours)}"
                     )
     return lines
 
@@ -442,7 +456,8 @@ def draw(results: xr.Dataset, path: Path) -> None:
     for row, (name, problem) in enumerate(PROBLEMS.items()):
         for column, level in enumerate(EXCEEDANCES):
             ax = axes[row, column]
-            for design, (colour, line, marker) in STYLES.items():
+            for design in results["design"].values:
+                colour, line, marker = STYLES[design]
                 part = results["error"].sel(problem=name, exceedance=level, design=design)
                 style = {"color": colour, "linestyle": line}
                 width = 1.6 if design == "tail-Kriging" else 1.0

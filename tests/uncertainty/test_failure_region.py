@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from scipy.special import expit, log_expit
 from scipy.stats import norm
 
 from maglev.uncertainty.failure_region import border_batch, fit_failure_region
@@ -28,6 +29,30 @@ def test_single_input_border_lies_between_held_and_lost():
     assert (region.lost_probability(points[3:]) < 0.1).all()
     middle = region.lost_probability(np.linspace(-1.9, -1.1, 5)[:, None])
     assert (np.diff(middle) < 0.0).all() and 0.25 < middle[2] < 0.75
+
+
+def test_borders_are_draws_from_the_posterior():
+    """One input, three coefficients: against the prior weighted by the likelihood."""
+    points = np.array([-3.5, -2.6, -1.4, -0.8, -0.1, 0.3, 0.9, 1.6, 2.4])
+    lost = points < -2.0
+    population = norm.ppf((np.arange(400) + 0.5) / 400)
+    prior = np.random.default_rng(11).standard_normal((200_000, 3)) * [6.0, 1.0, 0.1]
+    logit = 20.0 * prior @ np.array([points**0, points, points**2])
+    weight = np.exp(np.where(lost, log_expit(logit), log_expit(-logit)).sum(axis=1))
+    likely = weight > 1e-6 * weight.max()
+    prior, weight = prior[likely], weight[likely] / weight[likely].sum()
+    total = expit(20.0 * prior @ np.array([population**0, population, population**2])).mean(axis=1)
+    mean = weight @ total
+    deviation = np.sqrt(weight @ (total - mean) ** 2)
+
+    totals = [
+        fit_failure_region(points[:, None], lost, np.random.default_rng(seed)).total_probability(
+            population[:, None]
+        )
+        for seed in range(5)
+    ]
+    assert abs(np.mean(totals) - mean) < 0.15 * deviation
+    assert abs(np.std(totals) / deviation - 1.0) < 0.1
 
 
 def test_probability_and_its_interval_hold_the_truth():

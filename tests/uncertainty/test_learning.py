@@ -59,6 +59,26 @@ def test_batch_counts_the_chosen_as_a_sample():
     assert_array_equal(taylor_batch(Parabola(), samples, CANDIDATES, 4), [2, 3, 1, 0])
 
 
+class Bumps(Parabola):
+    """Flat at its only sample, the origin; remainder 100, 1 and 4 at the candidates below."""
+
+    points = np.zeros((1, 2))
+    values = np.zeros((1, 1))
+
+    def predict(self, points):
+        return np.select([points[:, [0]] > 0.0, points[:, [1]] > 0.0], [100.0, 1.0], 4.0)
+
+    def gradient(self, points):
+        return np.zeros((len(points), 1, 2))
+
+
+def test_batch_forgets_the_remainder_of_the_chosen():
+    # L = √109: first J = 1.04, 0.31, 0.23.  Then max R is 4 and max D is 3: J = 1.18 for the second
+    # and 1.47 for the third; with max R still 100 it would be 1.01 and 0.70.
+    candidates = np.array([[10.0, 0.0], [0.0, 3.0], [0.0, -2.0]])
+    assert_array_equal(taylor_batch(Bumps(), Bumps.points, candidates, 3), [0, 2, 1])
+
+
 def test_lost_sample_keeps_others_away():
     occupied = np.vstack([Parabola.points, [[3.0]]])
     assert 3 not in taylor_batch(Parabola(), occupied, CANDIDATES, 3)
