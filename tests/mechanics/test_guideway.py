@@ -229,30 +229,29 @@ def test_a_rail_is_continuous_within_a_unit_and_free_between_units(model):
     assert ahead - behind > 1e-5  # [m], the bending and shear of the overhang
 
 
-def test_the_overhang_of_a_unit_bends_as_a_cantilever():
+@pytest.mark.parametrize(
+    ("row", "second_moment", "rotation", "sign"),
+    [(0, "second_moment_vertical", PITCH, -1), (2, "second_moment_lateral", YAW, 1)],
+)
+def test_the_overhang_of_a_unit_bends_as_a_cantilever(row, second_moment, rotation, sign):
     guideway = Guideway(n_spans=1)
     model = build(guideway)
     force, arm = 1e5, 0.387
-    load = np.asarray(model.rail_rows([SPAN], RIGHT)[0].T @ [force]).ravel()
+    load = np.asarray(model.rail_rows([SPAN], RIGHT)[row].T @ [force]).ravel()
     motion = static_motion(model, load)
-    tip, slope = (row @ motion for row in model.rail_rows([SPAN], RIGHT)[:2])
-    end = model.rail_rows([SPAN - arm], RIGHT)
+    tip, slope = (rows @ motion for rows in model.rail_rows([SPAN], RIGHT)[row : row + 2])
+    root = model.rail_rows([SPAN - arm], RIGHT)[row] @ motion
     section = guideway.rail.section
-    EI = section.elastic_modulus * section.second_moment_vertical
+    EI = section.elastic_modulus * getattr(section, second_moment)
     shear = 0.4 * section.shear_modulus * section.area
     own = force * arm**3 / (3 * EI) + force * arm / shear
-    # What the arm's end does is seen in the unloaded girder's slope there.
-    theta = -motion[model.span_dof[0]][_girder_pitch_at(model, SPAN - arm)]
-    assert_allclose(tip, end[0] @ motion + theta * arm + own, rtol=1e-9)
-    assert_allclose(slope - theta, force * arm**2 / (2 * EI) + force / shear, rtol=1e-9)
-
-
-def _girder_pitch_at(model, x):
+    # The root turns with the girder node to which the last connector is tied.
     dof = model.span_dof[0]
     place, component = model.place[dof], model.component[dof]
-    here = np.isclose(place[:, 0], x) & (place[:, 1] == 0) & (component == PITCH)
-    assert here.sum() == 1
-    return np.flatnonzero(here)[0]
+    node = np.isclose(place[:, 0], SPAN - arm) & (place[:, 1] == 0) & (component == rotation)
+    turn = sign * motion[dof][node].item()
+    assert_allclose(tip, root + turn * arm + own, rtol=1e-9)
+    assert_allclose(slope - turn, force * arm**2 / (2 * EI) + force / shear, rtol=1e-8)
 
 
 def test_left_and_right_mirror_each_other(model):

@@ -115,6 +115,26 @@ def test_rigid_motions_carry_the_inertia_of_a_rod():
     assert_allclose([inertia[Z, PITCH], inertia[Y, YAW]], [-m * L**2 / 2, m * L**2 / 2], rtol=1e-12)
 
 
+def test_mass_without_shear_is_the_tabulated_one_of_a_slender_beam():
+    L = 3.096
+    slender = SLENDER.model_copy(
+        update={"second_moment_vertical": 1e-12, "second_moment_lateral": 1e-12}
+    )
+    mass = timoshenko.mass(slender, L)
+    # Przemieniecki, Theory of Matrix Structural Analysis (1968), eq. 11.30.
+    # fmt: off
+    table = slender.density * slender.area * L / 420 * np.array([
+        [156.0,    22 * L,     54.0,    -13 * L],
+        [22 * L,    4 * L**2,  13 * L,   -3 * L**2],
+        [54.0,     13 * L,    156.0,    -22 * L],
+        [-13 * L,  -3 * L**2, -22 * L,    4 * L**2],
+    ])
+    # fmt: on
+    for dof, sign in (([Y, YAW, 6 + Y, 6 + YAW], 1), ([Z, PITCH, 6 + Z, 6 + PITCH], -1)):
+        turn = np.array([1, sign, 1, sign])
+        assert_allclose(mass[np.ix_(dof, dof)], turn[:, np.newaxis] * table * turn, rtol=1e-9)
+
+
 def test_matrices_are_symmetric_and_the_mass_positive():
     stiffness, mass = timoshenko.stiffness(GIRDER, 0.387), timoshenko.mass(GIRDER, 0.387)
     assert_allclose(stiffness, stiffness.T, rtol=1e-14)
