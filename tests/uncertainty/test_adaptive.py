@@ -75,6 +75,8 @@ def test_error_is_the_largest_of_the_round_over_the_first_deviation():
     assert_array_equal(state.tested, [False, True])
     assert_allclose(state.error[1], [0.5, 0.4])
     assert_array_equal(state.round_index, [0, 0, 1, 1])
+    state = absorb(state, [[4.0]], [[7.0, 7.0]], None, [[7.3, 2.0]])  # the scale stays
+    assert_allclose(state.error[2], [0.3, 0.5])
 
 
 def test_lost_samples_poison_nothing():
