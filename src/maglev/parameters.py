@@ -270,8 +270,8 @@ class AirSpring(Parameters):
 class Magnet(Parameters):
     """A row of poles on one rigid magnet body, its suspension on the C-frames and its control.
 
-    The magnet hangs with both ends on neighbouring C-frames.  ``poles_per_controller`` poles share
-    one gap signal (their mean) and one current.
+    The magnet hangs with both ends on neighbouring C-frames.  Every pole has its own gap, its own
+    controller and its own current; all of a kind share the gains.
     """
 
     mass: float = quantity("kg", "mass", 600, source="H", confidence="M", above=0)
@@ -309,12 +309,6 @@ class Magnet(Parameters):
     pole_pitch: float = quantity(
         "m", "distance of neighbouring poles", 0.258, source="P", confidence="H", above=0
     )
-    poles_per_controller: int = Field(
-        12,
-        description="poles that share one gap signal and one current; divides n_poles",
-        ge=1,
-        json_schema_extra={"unit": "", "source": "P", "confidence": "M"},
-    )
     gap_reference: float = quantity(
         "m", "gap at rest, δ₀", "10 mm", source="H", confidence="H", above=0
     )
@@ -334,11 +328,6 @@ class Magnet(Parameters):
 
     @model_validator(mode="after")
     def _check(self) -> Magnet:
-        if self.n_poles % self.poles_per_controller:
-            raise ValueError(
-                f"poles_per_controller must divide n_poles = {self.n_poles}, "
-                f"got {self.poles_per_controller}"
-            )
         if not self.current_max > self.current_reference:
             raise ValueError(
                 f"current_max must exceed current_reference = {self.current_reference:g} A, "
@@ -374,7 +363,6 @@ class Train(Parameters):
             end_damping="1e4 N s/m",
             n_poles=3,
             pole_pitch="1.032 m",
-            poles_per_controller=3,
             gap_reference="10 mm",
             current_reference="25 A",
             preload="10 kN",

@@ -269,7 +269,7 @@ def test_a_mode_grows_below_the_static_limit_of_the_gain():
         (
             {
                 "suspension_magnet": Train().suspension_magnet.model_copy(
-                    update={"n_poles": 1, "poles_per_controller": 1}
+                    update={"n_poles": 1}
                 )
             },
             "n_poles must be at least 2",

@@ -1,4 +1,4 @@
-"""Where the train is when: the run from start to end, its step, and the stretch of track it sees."""
+"""Where the train is when: the run from start to end, its step, and the track it sees."""
 
 from __future__ import annotations
 

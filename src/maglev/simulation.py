@@ -1,0 +1,162 @@
+"""From a configuration and gains to passages: the one function that users of the model call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from maglev import datasets
+from maglev.mechanics import integrate, reference
+from maglev.mechanics import train as train_model
+from maglev.mechanics.course import n_steps, time_step, track_range
+from maglev.mechanics.irregularity import Profile, profile
+from maglev.mechanics.responses import GIRDER_RESPONSES, Passages, checked_gains
+from maglev.parameters import Config
+from maglev.stages import profiles
+
+HISTORY_INTERVAL = 1e-3
+"""Time between recorded rows of the histories, at most [s]; assumed: ten points in a period of the
+highest frequency in the band of the responses."""
+
+
+def simulate(
+    config: Config,
+    gains: npt.ArrayLike,
+    histories: bool = False,
+    solver: Literal["production", "reference"] = "production",
+    *,
+    n_threads: int = 1,
+    on_progress: Callable[[int], None] | None = None,
+) -> xr.Dataset:
+    """Take the train over the guideway once for every row of gains.
+
+    Parameters
+    ----------
+    config
+        Parameters of everything, from `maglev.load_config`.
+    gains : (sample, 4)
+        Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m].
+    histories
+        Whether to keep the time series of responses, gaps and currents.
+    solver
+        ``"production"``: compiled, many samples at once; ``"reference"``: full finite elements,
+        some hundred times slower.
+    n_threads
+        Rows of samples that the production solver runs at the same time; the numbers do not depend
+        on it.
+    on_progress
+        Called with the number of samples that have just finished (production solver).
+
+    Returns
+    -------
+    passages
+        Layout ``passage`` of `maglev.datasets`: on ``sample`` the extremes of the six responses
+        [m, m s-2] and their times [s], gaps [m], currents [A], ``status`` and where and when
+        levitation was lost; with ``histories`` also the time series on ``t``.  The extremes of a
+        lost sample are NaN.
+
+    Raises
+    ------
+    ValueError
+        If the gains have another shape or are not finite, the time step exceeds the stability
+        limit, the irregularity is shorter than the run, or the solver is unknown.
+    FileNotFoundError
+        If the irregularity's file does not exist.
+
+    References
+    ----------
+    docs/theory/integration.md.
+    """
+    gains = checked_gains(gains)
+    if solver not in ("production", "reference"):
+        raise ValueError(f"solver must be 'production' or 'reference', got {solver!r}")
+    every = max(1, int(HISTORY_INTERVAL / time_step(config) * (1 + 1e-9))) if histories else 0
+    if solver == "production":
+        passages = integrate.integrate(
+            _system(config),
+            gains,
+            record_every=every,
+            n_threads=n_threads,
+            on_progress=on_progress,
+        )
+    else:
+        passages, _ = reference.integrate(config, track(config), gains, record_every=every)
+    return datasets.describe(_dataset(config, gains, passages, histories))
+
+
+def track(config: Config) -> Profile:
+    """Irregularity over all the track that the train sees.
+
+    Parameters
+    ----------
+    config
+        Parameters of everything.
+
+    Raises
+    ------
+    ValueError, FileNotFoundError
+        If a measured profile cannot be read or is shorter than the run.
+    """
+    irregularity = config.irregularity
+    name = irregularity.profile_file if irregularity.enabled else None
+    measured = profiles.read(name) if name else None
+    return profile(irregularity, track_range(config), config.seed, measured)
+
+
+@lru_cache(maxsize=2)
+def _system(config: Config) -> integrate.System:
+    return integrate.prepare(config, track(config))
+
+
+def _dataset(
+    config: Config, gains: npt.NDArray[np.float64], passages: Passages, histories: bool
+) -> xr.Dataset:
+    one = ("sample",)
+    variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
+        name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)
+    }
+    for k, name in enumerate(GIRDER_RESPONSES):
+        variables[name] = (one, passages.girder[:, k])
+        variables[f"{name}_t"] = (one, passages.girder_time[:, k])
+    cars = np.arange(config.train.n_cars)
+    for axis, extreme, when in (
+        ("z", passages.body_z, passages.body_z_time),
+        ("y", passages.body_y, passages.body_y_time),
+    ):
+        name = f"car_body_acceleration_{axis}"
+        worst = np.where(np.isnan(extreme), -1.0, extreme).argmax(axis=1)[:, None]
+        variables[name] = (one, np.take_along_axis(extreme, worst, axis=1)[:, 0])
+        variables[f"{name}_t"] = (one, np.take_along_axis(when, worst, axis=1)[:, 0])
+        variables[f"{name}_per_car"] = (("sample", "car"), extreme)
+    for k, kind in enumerate(("suspension", "guidance")):
+        variables[f"{kind}_gap_min"] = (one, passages.gap_min[:, k])
+        variables[f"{kind}_gap_max"] = (one, passages.gap_max[:, k])
+        variables[f"{kind}_current_max"] = (one, passages.current_max[:, k])
+    variables["status"] = (one, passages.status)
+    variables["lost_t"] = (one, passages.lost_time)
+    variables["lost_magnet"] = (one, passages.lost_magnet)
+    coordinates = {"sample": np.arange(gains.shape[0]), "car": cars}
+    if histories:
+        for k, name in enumerate(GIRDER_RESPONSES):
+            variables[f"{name}_history"] = (("sample", "t"), passages.girder_history[:, k])
+        of_car = ("sample", "car", "t")
+        variables["car_body_acceleration_z_history"] = (of_car, passages.body_z_history)
+        variables["car_body_acceleration_y_history"] = (of_car, passages.body_y_history)
+        of_magnet = ("sample", "magnet", "t")
+        variables["gap_history"] = (of_magnet, passages.gap_history)
+        variables["current_history"] = (of_magnet, passages.current_history)
+        magnets = train_model.build(config.train).magnets
+        variables["magnet_kind"] = (("magnet",), magnets.is_guidance.astype(np.int8))
+        variables["magnet_side"] = (("magnet",), magnets.side)
+        variables["magnet_x"] = (("magnet",), magnets.x)
+        coordinates |= {"magnet": np.arange(magnets.x.size), "t": passages.time}
+    return xr.Dataset(
+        variables,
+        coords=coordinates,
+        attrs={"time_step": time_step(config), "n_steps": n_steps(config)},
+    )
