@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import expit, log_expit
 from scipy.stats import norm
 
@@ -94,6 +94,26 @@ def test_border_batch_shrinks_the_uncertainty_fastest():
     assert ((doubt > 0.02) & (doubt < 0.98)).all()
     assert spread_after(candidates[chosen]) < 0.6 * np.std(region.total_probability(POPULATION))
     assert spread_after(candidates[chosen]) < 0.7 * spread_after(candidates[:6])
+
+
+def test_border_batch_is_the_best_linear_predictor_of_the_probability():
+    """Every choice against least squares: regression of P on the outcomes chosen so far."""
+    points, region = learnt(60, 6)
+    candidates = POPULATION[:300]
+    total = region.total_probability(candidates)
+    outcome = np.array([region._by_border(candidates[[c]])[0] for c in range(300)])
+    open_question = np.flatnonzero(outcome.var(axis=1) > 1e-3)
+
+    def unexplained(chosen):
+        design = np.column_stack([np.ones(total.size), *outcome[chosen]])
+        residual = total - design @ np.linalg.lstsq(design, total, rcond=None)[0]
+        return residual @ residual
+
+    taken = []
+    for choice in border_batch(region, points, candidates, 3):
+        best = min(unexplained([*taken, other]) for other in open_question)
+        taken.append(choice)
+        assert_allclose(unexplained(taken), best, rtol=1e-6)
 
 
 def test_border_batch_takes_nothing_twice():
