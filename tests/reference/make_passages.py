@@ -3,7 +3,7 @@
 Run as ``python tests/reference/make_passages.py [speed_kmh track]``: without arguments all four
 passages (several hours on one core), with arguments one of them, such as ``430 smooth``.  Each
 passage takes three sets of gains over the default guideway with a step small enough that Newmark's
-lengthening of the pole-passing period (about (ωΔt)²/12) stays below 0.3 %.
+lengthening of the pole-passing period (about (ωΔt)²/12) stays below 0.4 %.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ GAIN_FACTORS = np.array([[1.0, 1.0, 1.0, 1.0], [0.85, 1.2, 0.9, 1.1], [1.2, 0.85
 PASSAGES = {
     (430, "irregular"): 0.06e-3,
     (430, "smooth"): 0.06e-3,
-    (200, "irregular"): 0.12e-3,
-    (200, "smooth"): 0.12e-3,
+    (200, "irregular"): 0.16e-3,
+    (200, "smooth"): 0.16e-3,
 }
 """Speed [km/h] and track of each stored passage, and its largest time step [s]."""
 

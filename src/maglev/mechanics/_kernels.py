@@ -58,8 +58,10 @@ class Line(NamedTuple):
     intervals: int  # splines' intervals a span
     stride: int  # rows of spline coefficients a span, at least intervals + 3, a multiple of 4
     upright_start: np.ndarray  # (span + 1,)
+    upright_felt: np.ndarray  # (span,) end of those slow enough for a magnet to feel
     upright: np.ndarray  # coordinates that move a span's rails up and down
     sideways_start: np.ndarray  # (span + 1,)
+    sideways_felt: np.ndarray  # (span,)
     sideways: np.ndarray  # coordinates that roll a span or move it sideways
     rail_z: np.ndarray  # (upright, stride)
     rail_roll: np.ndarray  # (sideways, stride)
@@ -81,13 +83,15 @@ class Line(NamedTuple):
     midspan_acceleration: np.ndarray  # (2, output column) the same per stepped acceleration
 
 
-class Track(NamedTuple):
-    """Irregularity on a uniform grid, by cubic Hermite interpolation."""
+class Places(NamedTuple):
+    """What a pole of one kind meets at every place it can be at after a whole number of steps."""
 
-    start: float
-    spacing: float
-    value: np.ndarray  # (kind * 2 + side, grid) [m]
-    slope: np.ndarray  # (kind * 2 + side, grid) [-]
+    number: np.ndarray  # (row, pole) place at time zero; each step moves on by one
+    base: np.ndarray  # (place,) first spline coefficient, -1 off the guideway
+    weight: np.ndarray  # (place, 4) of the splines' motion
+    rise: np.ndarray  # (place, 4) of the splines' motion in its rate at the pole [1/s]
+    rail: np.ndarray  # (place, side) irregularity [m]
+    ramp: np.ndarray  # (place, side) its rate at the pole [m/s]
 
 
 class Run(NamedTuple):
@@ -153,62 +157,10 @@ def _project(matrix, columns, start, stop, source, first, target):
 
 
 @njit(cache=True, error_model="numpy")
-def _place_row(line, track, rows, row, nose, speed, base, weight, rise, first_track, rail, ramp):
-    """Where the poles of one row of magnets are: splines they touch, irregularity under them.
-
-    ``base`` is -1 off the guideway; ``rise`` is what the train's advance adds to the rate of the
-    splines' sum [1/s]; ``rail`` and ``ramp`` get the irregularity [m] and its rate [m/s] per side
-    and pole.
-    """
-    spacing = line.span_length / line.intervals
-    pace = speed / spacing
-    n_poles = rows.offset.size
-    for p in range(n_poles):
-        x = nose + rows.x[row] + rows.offset[p]
-        span = int(np.floor(x / line.span_length))
-        if span < 0 or span >= line.n_spans:
-            base[p] = -1
-        else:
-            local = (x - span * line.span_length) / spacing
-            interval = min(int(local), line.intervals - 1)
-            u = local - interval
-            v = 1.0 - u
-            base[p] = span * line.stride + interval
-            weight[p, 0] = v * v * v / 6.0
-            weight[p, 1] = (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0
-            weight[p, 2] = (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0
-            weight[p, 3] = u * u * u / 6.0
-            rise[p, 0] = -0.5 * v * v * pace
-            rise[p, 1] = (1.5 * u * u - 2.0 * u) * pace
-            rise[p, 2] = -(1.5 * v * v - 2.0 * v) * pace
-            rise[p, 3] = 0.5 * u * u * pace
-        local = (x - track.start) / track.spacing
-        k = int(local)
-        u = local - k
-        h = track.spacing
-        a = 1.0 + u * u * (2.0 * u - 3.0)
-        b = u * (1.0 - u) * (1.0 - u) * h
-        c = u * u * (3.0 - 2.0 * u)
-        d = u * u * (u - 1.0) * h
-        e = 6.0 * u * (1.0 - u) / h
-        f = 1.0 - 4.0 * u + 3.0 * u * u
-        g = u * (3.0 * u - 2.0)
-        for side in range(2):
-            y0 = track.value[first_track + side, k]
-            y1 = track.value[first_track + side, k + 1]
-            s0 = track.slope[first_track + side, k]
-            s1 = track.slope[first_track + side, k + 1]
-            rail[side, p] = a * y0 + b * s0 + c * y1 + d * s1
-            ramp[side, p] = speed * (e * (y1 - y0) + f * s0 + g * s1)
-
-
-@njit(cache=True, error_model="numpy")
 def _magnets(
-    line,
-    track,
+    places,
     rows,
-    run,
-    nose,
+    step,
     gains,
     x,
     velocity,
@@ -221,10 +173,15 @@ def _magnets(
     magnet_max,
     magnet_gap,
     magnet_current,
-    scratch,
 ):
     """Close all magnets of one kind: gaps, currents, forces on train and rails."""
-    base, weight, rise, rail, ramp = scratch
+    base, weight, rise, rail, ramp = (
+        places.base,
+        places.weight,
+        places.rise,
+        places.rail,
+        places.ramp,
+    )
     n_poles = rows.offset.size
     kind = 1 if rows.is_guidance else 0
     proportional = load(gains, 2 * kind)
@@ -234,9 +191,6 @@ def _magnets(
     strongest = load(outcome.current_max, kind)
     at_rest = least * 0.0 + rows.current_reference
     for row in range(rows.x.size):
-        _place_row(
-            line, track, rows, row, nose, run.speed, base, weight, rise, 2 * kind, rail, ramp
-        )
         for side in range(2):
             field = 2 if kind == 1 else side
             motion, motion_velocity, rail_pull = (
@@ -258,15 +212,16 @@ def _magnets(
             gap_sum = total
             current_sum = total
             for p in range(n_poles):
-                opening = fma(turn, rows.arm[p], shift) - rail[side, p]
-                rate = fma(turn_velocity, rows.arm[p], shift_velocity) - ramp[side, p]
-                k = base[p]
+                here = places.number[row, p] + step
+                opening = fma(turn, rows.arm[p], shift) - rail[here, side]
+                rate = fma(turn_velocity, rows.arm[p], shift_velocity) - ramp[here, side]
+                k = base[here]
                 if k >= 0:
                     for j in range(4):
                         deflection = load(motion, k + j)
-                        opening = fma(deflection, -weight[p, j], opening)
-                        rate = fma(deflection, -rise[p, j], rate)
-                        rate = fma(load(motion_velocity, k + j), -weight[p, j], rate)
+                        opening = fma(deflection, -weight[here, j], opening)
+                        rate = fma(deflection, -rise[here, j], rate)
+                        rate = fma(load(motion_velocity, k + j), -weight[here, j], rate)
                 error = opening * sign
                 gap = error + rows.gap_reference
                 current = fma(proportional, error, fma(derivative, rate * sign, at_rest))
@@ -278,7 +233,9 @@ def _magnets(
                 if k >= 0:
                     for j in range(4):
                         store(
-                            rail_pull, k + j, fma(pull, sign * weight[p, j], load(rail_pull, k + j))
+                            rail_pull,
+                            k + j,
+                            fma(pull, sign * weight[here, j], load(rail_pull, k + j)),
                         )
                 smallest = minimum(smallest, gap)
                 largest = maximum(largest, gap)
@@ -392,14 +349,16 @@ def _note_lost(run, magnet_min, magnet_max, outcome, time):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
+def passage(
+    vehicle, suspension, guidance, suspension_places, guidance_places, line, run, gains, outcome
+):
     """Take one row of samples over the guideway.
 
     Velocity Verlet with a predicted velocity in the forces: second order, one evaluation a step.
 
     Parameters
     ----------
-    vehicle, suspension, guidance, line, track, run
+    vehicle, suspension, guidance, suspension_places, guidance_places, line, run
         The system and the passage.
     gains : (4, LANES)
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d.
@@ -409,7 +368,6 @@ def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
     n_dof, n_line = vehicle.inverse_mass.size, line.row_start.size - 1
     n_cars = vehicle.body_z.size
     n_magnets = 2 * (suspension.x.size + guidance.x.size)
-    most_poles = max(suspension.offset.size, guidance.offset.size)
     dt = run.time_step
     half, half_square = 0.5 * dt, 0.5 * dt * dt
     x = np.zeros((n_dof, LANES))
@@ -431,13 +389,6 @@ def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
     magnet_gap = np.zeros((n_magnets, LANES))
     magnet_current = np.zeros((n_magnets, LANES))
     filtered = np.zeros((4, LANES))
-    scratch = (
-        np.zeros(most_poles, np.int64),
-        np.zeros((most_poles, 4)),
-        np.zeros((most_poles, 4)),
-        np.zeros((2, most_poles)),
-        np.zeros((2, most_poles)),
-    )
     b0, b1, b2 = run.filter_b[0], run.filter_b[1], run.filter_b[2]
     a1, a2 = run.filter_a[1], run.filter_a[2]
     for step in range(1, run.n_steps + 1):
@@ -459,14 +410,14 @@ def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
         last = min(line.n_spans - 1, int(np.floor(nose / line.span_length)))
         for span in range(first, last + 1):
             at = span * line.stride
-            up, up_end = line.upright_start[span], line.upright_start[span + 1]
-            out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
+            up, up_felt = line.upright_start[span], line.upright_felt[span]
+            out, out_felt = line.sideways_start[span], line.sideways_felt[span]
             for quantity in range(2):
                 source = line_x if quantity == 0 else line_predicted
                 target = rail_motion if quantity == 0 else rail_velocity
-                _transform(line.rail_z, line.upright, up, up_end, source, at, target[0])
-                _transform(line.rail_roll, line.sideways, out, out_end, source, 0, roll)
-                _transform(line.rail_y, line.sideways, out, out_end, source, at, target[2])
+                _transform(line.rail_z, line.upright, up, up_felt, source, at, target[0])
+                _transform(line.rail_roll, line.sideways, out, out_felt, source, 0, roll)
+                _transform(line.rail_y, line.sideways, out, out_felt, source, at, target[2])
                 for k in range(line.stride):
                     mean, turn = load(target[0], at + k), load(roll, k)
                     store(target[0], at + k, mean + turn)
@@ -476,14 +427,12 @@ def passage(vehicle, suspension, guidance, line, track, run, gains, outcome):
                     store(rail_force[side], at + k, load(roll, k) * 0.0)
         _links(vehicle, x, predicted, acceleration)
         _magnets(
-            line, track, suspension, run, nose, gains, x, predicted, acceleration, rail_motion,
+            suspension_places, suspension, step, gains, x, predicted, acceleration, rail_motion,
             rail_velocity, rail_force, outcome, magnet_min, magnet_max, magnet_gap, magnet_current,
-            scratch,
         )  # fmt: skip
         _magnets(
-            line, track, guidance, run, nose, gains, x, predicted, acceleration, rail_motion,
+            guidance_places, guidance, step, gains, x, predicted, acceleration, rail_motion,
             rail_velocity, rail_force, outcome, magnet_min, magnet_max, magnet_gap, magnet_current,
-            scratch,
         )  # fmt: skip
         for span in range(first, last + 1):
             at = span * line.stride

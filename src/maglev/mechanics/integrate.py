@@ -20,15 +20,21 @@ from maglev.mechanics._kernels import (
     Line,
     MagnetRows,
     Outcome,
+    Places,
     Run,
-    Track,
     Vehicle,
     passage,
 )
 from maglev.mechanics.course import n_steps, time_step, track_range
-from maglev.mechanics.irregularity import Profile
+from maglev.mechanics.irregularity import Profile, displacement
 from maglev.mechanics.lanes import LANES
-from maglev.mechanics.reduction import SPLINE_INTERVALS, ReducedGuideway, reduce
+from maglev.mechanics.reduction import (
+    SPLINE_INTERVALS,
+    ReducedGuideway,
+    reduce,
+    spline_slopes,
+    spline_weights,
+)
 from maglev.mechanics.responses import Passages, acceleration_filter, checked_gains
 from maglev.parameters import Config, Magnet
 
@@ -45,8 +51,9 @@ class System:
     vehicle: Vehicle
     suspension: MagnetRows
     guidance: MagnetRows
+    suspension_places: Places
+    guidance_places: Places
     line: Line
-    track: Track
     config: Config
 
 
@@ -90,19 +97,16 @@ def prepare(config: Config, profile: Profile) -> System:
             f"the irregularity must reach from {start:.1f} m to {stop:.1f} m, "
             f"got {profile.x0:.1f} m to {grid_stop:.1f} m"
         )
+    suspension, guidance = (_magnet_rows(train, guidance=kind) for kind in (False, True))
     return System(
         train=train,
         reduced=reduced,
         vehicle=_vehicle(train),
-        suspension=_magnet_rows(train, guidance=False),
-        guidance=_magnet_rows(train, guidance=True),
-        line=_line(reduced, time_step(config)),
-        track=Track(
-            profile.x0,
-            profile.dx,
-            np.ascontiguousarray(profile.values),
-            np.ascontiguousarray(profile.slopes),
-        ),
+        suspension=suspension,
+        guidance=guidance,
+        suspension_places=_places(config, suspension, profile),
+        guidance_places=_places(config, guidance, profile),
+        line=_line(reduced, time_step(config), config.passage.mode_cutoff_elsewhere),
         config=config,
     )
 
@@ -157,8 +161,9 @@ def integrate(
             system.vehicle,
             system.suspension,
             system.guidance,
+            system.suspension_places,
+            system.guidance_places,
             system.line,
-            system.track,
             run,
             lanes,
             outcome,
@@ -310,28 +315,74 @@ def _magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows
     )
 
 
-def _line(reduced: ReducedGuideway, time_step: float) -> Line:
-    columns = reduced.span_coordinates
-    n_coefficients = reduced.rail_z[0].shape[1]
-    stride = -(-n_coefficients // 4) * 4
-    scale = 1e-9 * max(np.abs(z).max() for z in reduced.rail_z)
-    upright = [np.abs(z).max(axis=1) > scale for z in reduced.rail_z]
-    sideways = [
-        (np.abs(roll) + np.abs(y)).max(axis=1) > scale
-        for roll, y in zip(reduced.rail_roll, reduced.rail_y, strict=True)
-    ]
+def _stride() -> int:
+    """Rows of spline coefficients a span, rounded up to what the kernels do at once."""
+    return -(-(SPLINE_INTERVALS + 3) // 4) * 4
 
-    def stacked(shapes: tuple[Array, ...], chosen: list[npt.NDArray[np.bool_]]) -> Array:
+
+def _places(config: Config, rows: MagnetRows, profile: Profile) -> Places:
+    """Tabulate splines and irregularity where the poles are after whole numbers of steps."""
+    advance = config.passage.speed * time_step(config)
+    start = (rows.x[:, None] + rows.offset - config.passage.approach) / advance
+    whole = np.floor(start + 1e-6)
+    beyond = np.round(start - whole, 6)  # share of a step; places with the same one form a series
+    series = np.unique(beyond)
+    first = int(whole.min())
+    count = int(whole.max()) - first + n_steps(config) + 1
+    number = (whole - first).astype(np.int64) + count * np.searchsorted(series, beyond)
+    x = ((first + np.arange(count) + series[:, None]) * advance).ravel()
+    length, n_spans = config.guideway.span_length, config.guideway.n_spans
+    span = np.floor(x / length).astype(np.int64)
+    on = (span >= 0) & (span < n_spans)
+    local = (x / length - span) * SPLINE_INTERVALS
+    interval = np.clip(np.floor(local).astype(np.int64), 0, SPLINE_INTERVALS - 1)
+    u = local - interval
+    stride = _stride()
+    rate = config.passage.speed * SPLINE_INTERVALS / length
+    value, slope = displacement(profile, x)
+    kind = slice(2, 4) if rows.is_guidance else slice(0, 2)
+    return Places(
+        number=number,
+        base=np.where(on, span * stride + interval, -1),
+        weight=np.where(on[:, None], spline_weights(u), 0.0),
+        rise=np.where(on[:, None], spline_slopes(u) * rate, 0.0),
+        rail=np.ascontiguousarray(value[kind].T),
+        ramp=np.ascontiguousarray(slope[kind].T) * config.passage.speed,
+    )
+
+
+def _line(reduced: ReducedGuideway, time_step: float, felt: float) -> Line:
+    """Guideway for the kernels; magnets feel the motion of its modes up to ``felt`` [Hz]."""
+    columns = reduced.span_coordinates
+    omega = np.zeros(reduced.n_coordinates)  # pier tops first
+    omega[: reduced.n_modes] = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes])
+    n_coefficients = reduced.rail_z[0].shape[1]
+    stride = _stride()
+    least = 1e-9 * max(np.abs(z).max() for z in reduced.rail_z)
+
+    def moving(*shapes: Array) -> list[IntArray]:
+        """Columns of each span that move its rails, the slow ones first."""
+        chosen = []
+        for column, *shape in zip(columns, *shapes, strict=True):
+            which = np.flatnonzero(sum(np.abs(one).max(axis=1) for one in shape) > least)
+            chosen.append(which[np.argsort(omega[column[which]], kind="stable")])
+        return chosen
+
+    def stacked(shapes: tuple[Array, ...], chosen: list[IntArray]) -> Array:
         rows = [shape[which] for shape, which in zip(shapes, chosen, strict=True)]
         return np.pad(np.concatenate(rows), ((0, 0), (0, stride - n_coefficients)))
 
-    def numbered(chosen: list[npt.NDArray[np.bool_]]) -> tuple[IntArray, IntArray]:
-        counts = [int(which.sum()) for which in chosen]
+    def numbered(chosen: list[IntArray]) -> tuple[IntArray, IntArray, IntArray]:
+        """Start of each span, end of what its magnets feel, and the coordinates."""
         numbers = [column[which] for column, which in zip(columns, chosen, strict=True)]
-        return np.concatenate([[0], np.cumsum(counts)]), np.concatenate(numbers)
+        start = np.concatenate([[0], np.cumsum([number.size for number in numbers])])
+        slow = [int((omega[number] <= 2 * np.pi * felt).sum()) for number in numbers]
+        return start, start[:-1] + slow, np.concatenate(numbers)
 
-    upright_start, upright_column = numbered(upright)
-    sideways_start, sideways_column = numbered(sideways)
+    upright = moving(reduced.rail_z)
+    sideways = moving(reduced.rail_roll, reduced.rail_y)
+    upright_start, upright_felt, upright_column = numbered(upright)
+    sideways_start, sideways_felt, sideways_column = numbered(sideways)
     response = step_response(reduced, time_step)
     damping = reduced.relative_damping.copy()
     phase = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes]) * time_step
@@ -354,8 +405,10 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
         intervals=SPLINE_INTERVALS,
         stride=stride,
         upright_start=upright_start,
+        upright_felt=upright_felt,
         upright=upright_column,
         sideways_start=sideways_start,
+        sideways_felt=sideways_felt,
         sideways=sideways_column,
         rail_z=stacked(reduced.rail_z, upright),
         rail_roll=stacked(reduced.rail_roll, sideways),

@@ -117,6 +117,12 @@ def spline_weights(u: Array) -> Array:
     return np.stack([v**3, 3 * u**3 - 6 * u**2 + 4, 3 * v**3 - 6 * v**2 + 4, u**3], axis=-1) / 6.0
 
 
+def spline_slopes(u: Array) -> Array:
+    """Derivatives of `spline_weights` with respect to the place in the interval (point, 4) [-]."""
+    v = 1.0 - u
+    return np.stack([-(v**2), 3 * u**2 - 4 * u, 4 * v - 3 * v**2, u**2], axis=-1) / 2.0
+
+
 def reduce(
     model: full.GuidewayModel, cutoff: float, cutoff_elsewhere: float | None = None
 ) -> ReducedGuideway:
