@@ -103,7 +103,7 @@ def _table() -> dict[str, Variable]:
             dims=("sample",), units="1", long_name="number of the passage", dtype="int64"
         ),
         "car": Variable(
-            dims=("car",), units="1", long_name="number of the car from the nose", dtype="int32"
+            dims=("car",), units="1", long_name="number of the car from the nose, counted from 0", dtype="int32"
         ),
         "magnet": Variable(
             dims=("magnet",), units="1", long_name="number of the magnet", dtype="int32"

@@ -34,7 +34,7 @@ def figure(history: xr.Dataset, sweep: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     figure, plotted
         The figure and the numbers in it.
     """
-    fig, (time, factor, peak) = style.panels(1, 3, style.PAGE, 2.7)
+    fig, (time, factor, peak) = style.panels(1, 3, style.PAGE, 2.8)
     shown = history.sel(t=_window(history))
     speed = style.KMH * shown["passage_speed"].item()
     deflection = 1e3 * shown["deflection"]
@@ -49,7 +49,7 @@ def figure(history: xr.Dataset, sweep: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     time.set(xlabel="time [s]", ylabel="midspan deflection, downwards [mm]")
     time.set_ylim(top=1.45 * float(deflection.max()))
     time.legend(loc="upper left")
-    style.note(time, f"{deflection.max().item():.3f} mm\nat {speed:.0f} km/h", top=False)
+    style.titled(time, "a", f"{deflection.max().item():.3f} mm at {speed:.0f} km/h")
 
     kmh = style.KMH * sweep["speed"].to_numpy()
     kept = sweep["passage_status"].to_numpy() == 0
@@ -72,12 +72,8 @@ def figure(history: xr.Dataset, sweep: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     factor.margins(y=0.25)
     factor.legend(loc="upper left")
     fastest = sweep.isel(speed=-1)
-    style.note(
-        factor,
-        f"{fastest['dynamic_factor'].item():.3f} at {kmh[-1]:.0f} km/h\n"
-        f"static {1e3 * sweep['static_deflection'].item():.3f} mm",
-        top=False,
-    )
+    style.titled(factor, "b", f"{fastest['dynamic_factor'].item():.3f} at {kmh[-1]:.0f} km/h")
+    style.note(factor, f"1.000 is {1e3 * sweep['static_deflection'].item():.3f} mm", top=False)
 
     peak.plot(
         kmh,
@@ -99,14 +95,16 @@ def figure(history: xr.Dataset, sweep: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         label=f"measured ({confidence} confidence)",
     )
     peak.set(xlabel="speed [km/h]", ylabel="largest deflection [mm]")
-    peak.margins(y=0.25)
+    peak.margins(y=0.4)
+    fastest_measured = style.KMH * sweep["measured_speed"].to_numpy()[-1]
+    style.titled(
+        peak, "c", f"measured {1e3 * measured.to_numpy()[-1]:.3f} mm at {fastest_measured:.0f} km/h"
+    )
     peak.legend(loc="upper left")
     if not kept.all():
         for axis in (factor, peak):
             for lost in kmh[~kept]:
                 axis.axvline(lost, color=style.QUIET, ls=":", lw=0.8)
         style.note(peak, "dotted: levitation lost", top=False)
-    else:
-        style.note(peak, f"measured {1e3 * measured.max().item():.3f} mm", top=False)
     plotted = xr.merge([shown.drop_vars("static_deflection_moving_load"), sweep], join="outer")
     return fig, plotted

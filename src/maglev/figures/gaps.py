@@ -35,7 +35,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     for column, (kind, code) in enumerate(_KINDS):
         magnets = first.isel(magnet=(first["magnet_kind"] == code).to_numpy())
         swing = magnets["gap_history"].max("t") - magnets["gap_history"].min("t")
-        busiest = int(swing.argmax())
+        busiest = int(swing.to_numpy().argmax())
         side = "right" if magnets["magnet_side"].to_numpy()[busiest] > 0 else "left"
         place = magnets["magnet_x"].to_numpy()[busiest]
         rows = (("gap", 1e3, "mm"), ("current", 1.0, "A"))

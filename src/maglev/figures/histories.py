@@ -46,8 +46,8 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         history = scale * first[f"{response}_history"]
         where = ""
         if "car" in history.dims:
-            car = int(first[f"{response}_per_car"].argmax())
-            where = f", car {first['car'].to_numpy()[car]}"
+            car = int(first[f"{response}_per_car"].to_numpy().argmax())
+            where = f", car {car + 1} of {first.sizes['car']}"
             history = history.isel(car=car)
         axis.plot(first.t, history, color=style.MODEL, lw=0.6)
         extreme, at = scale * first[response].item(), first[f"{response}_t"].item()

@@ -45,9 +45,15 @@ def page() -> Iterator[None]:
         yield
 
 
+def titled(axis: Axes, letter: str, text: str) -> None:
+    """Put a panel's letter, and the number that matters, over its left edge."""
+    axis.set_title(f"({letter}) {text}", loc="left")
+
+
 def panels(rows: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
     """A figure [inch] of equal panels, lettered (a), (b) … from left to right."""
     figure = Figure(figsize=(width, height), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.07)
     axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
     for letter, axis in zip("abcdefghijklmnop", axes, strict=False):
         axis.set_title(f"({letter})", loc="left")
