@@ -418,12 +418,19 @@ def test_elements_as_they_are_give_frequencies_of_a_fine_mesh():
     assert_allclose(coarse, fine, rtol=2e-3)
 
 
-def test_twenty_like_spans_hold_five_times_the_weight_of_four():
+def test_an_inner_span_bends_alike_in_a_longer_line():
     four, twenty = (build(Guideway(n_spans=n)) for n in (4, 20))
     assert twenty.n_dof - four.n_dof == 16 * (four.span_dof[0].size + 60)
     middle = twenty.girder_rows([SPAN * 10.5])[0] @ static_motion(twenty, train_at_rest(twenty))
     same = four.girder_rows([SPAN * 1.5])[0] @ static_motion(four, train_at_rest(four))
     assert_allclose(middle, same, rtol=1e-3)
+
+
+@pytest.mark.parametrize("refinement", [1, 2])
+def test_a_girder_node_lies_at_midspan(refinement):
+    model = build(Guideway(n_spans=3, refinement=refinement))
+    for row in model.girder_rows(SPAN * (np.arange(3) + 0.5)):
+        assert_allclose(np.sort(row.toarray(), axis=1)[:, -2:], [[0, 1]] * 3, atol=1e-12)
 
 
 def test_odd_units_with_a_connector_at_midspan_are_built():
