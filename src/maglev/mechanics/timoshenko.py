@@ -4,8 +4,8 @@ The element lies along x, y points right and z down.  Each node has six degrees 
 order x, y, z, roll φ, pitch θ, yaw ψ, all small and right-handed, so that a section a distance dx
 further on moves by ``u_y = ψ dx`` and ``u_z = -θ dx``.  Deflection (cubic) and section rotation
 (quadratic) are interpolated together from the homogeneous static solution: the element does not
-lock, and it is exact for loads at its nodes.  Its shear strain is uniform, so frequencies converge with the
-square of its length, and with the fourth power where shear counts for nothing.  Theory:
+lock, and it is exact for loads at its nodes.  Its shear strain is uniform, so frequencies converge
+with the square of its length, and with the fourth power where shear counts for nothing.  Theory:
 docs/theory/guideway.md.
 """
 
