@@ -201,10 +201,10 @@ def _magnets(
             sign = rows.outward[side]
             translation = rows.translation[row, side]
             rotation = rows.rotation[row, side]
-            shift = load(x, translation)
-            turn = load(x, rotation)
-            shift_velocity = load(velocity, translation)
-            turn_velocity = load(velocity, rotation)
+            shift = load(x, translation) * sign
+            turn = load(x, rotation) * sign
+            shift_velocity = load(velocity, translation) * sign
+            turn_velocity = load(velocity, rotation) * sign
             total = shift * 0.0
             moment = total
             smallest = total + 1.0e9
@@ -213,18 +213,17 @@ def _magnets(
             current_sum = total
             for p in range(n_poles):
                 here = places.number[row, p] + step
-                opening = fma(turn, rows.arm[p], shift) - rail[here, side]
-                rate = fma(turn_velocity, rows.arm[p], shift_velocity) - ramp[here, side]
+                error = fma(turn, rows.arm[p], shift) - sign * rail[here, side]
+                rate = fma(turn_velocity, rows.arm[p], shift_velocity) - sign * ramp[here, side]
                 k = base[here]
                 if k >= 0:
                     for j in range(4):
                         deflection = load(motion, k + j)
-                        opening = fma(deflection, -weight[here, j], opening)
-                        rate = fma(deflection, -rise[here, j], rate)
-                        rate = fma(load(motion_velocity, k + j), -weight[here, j], rate)
-                error = opening * sign
+                        error = fma(deflection, -sign * weight[here, j], error)
+                        rate = fma(deflection, -sign * rise[here, j], rate)
+                        rate = fma(load(motion_velocity, k + j), -sign * weight[here, j], rate)
                 gap = error + rows.gap_reference
-                current = fma(proportional, error, fma(derivative, rate * sign, at_rest))
+                current = fma(proportional, error, fma(derivative, rate, at_rest))
                 current = maximum(minimum(current, rows.current_max), 0.0)
                 ratio = current / gap
                 pull = ratio * ratio * rows.constant[row, side, p]
