@@ -752,7 +752,7 @@ class Passage(Parameters):
         "Hz",
         "highest mode of the middle span, where responses are taken, in the production solver; "
         "damping is a share of critical up to here",
-        700,
+        850,
         source="D",
         confidence="M",
         above=0,
@@ -760,7 +760,7 @@ class Passage(Parameters):
     mode_cutoff_elsewhere: float = quantity(
         "Hz",
         "highest mode of piers and other spans in the production solver",
-        200,
+        300,
         source="D",
         confidence="M",
         above=0,
