@@ -361,8 +361,8 @@ def page(results: xr.Dataset, figure: Path) -> str:
         f"response: median / worst of {seeds} seeds.  Truth and surrogate are read off the same "
         f"{N_POPULATION} points, so the error is the surrogate's alone; adaptive designs start "
         f"from {N_FIRST} GF points and add {N_BATCH} at a time.  ∞: the estimated probability of "
-        f"loss exceeds the level (a gap in the figure).  A design that met no lost sample takes that probability as 0: "
-        "its limit on the cliff is finite, and too low.  The smallest median is bold.",
+        f"loss exceeds the level (a gap in the figure).  A design that met no lost sample "
+        "takes that probability as 0: its limit on the cliff is finite, and too low.  The smallest median is bold.",
         "",
         f"![error of the limits against calls]({figure.name})",
         "",
@@ -407,8 +407,8 @@ def page(results: xr.Dataset, figure: Path) -> str:
         "",
         "## Time",
         "",
-        f"Wall seconds to {N_LARGEST} calls on one core of the machine of the last run, which other "
-        "work may have shared; fits and choices together, median over seeds, slowest function; "
+        f"Wall seconds to {N_LARGEST} calls on one core of the machine of the last run, which "
+        "other work may have shared; fits and choices together, median over seeds, slowest function; "
         "one-stage designs are fitted anew at every size: "
         + ", ".join(f"{design} {float(last.sel(design=design)):.1f}" for design in DESIGNS)
         + ".",
