@@ -103,7 +103,7 @@ def _table() -> dict[str, Variable]:
             dims=("sample",), units="1", long_name="number of the passage", dtype="int64"
         ),
         "car": Variable(
-            dims=("car",), units="1", long_name="number of the car from the nose, counted from 0", dtype="int32"
+            dims=("car",), units="1", long_name="number of the car, 0 at the nose", dtype="int32"
         ),
         "magnet": Variable(
             dims=("magnet",), units="1", long_name="number of the magnet", dtype="int32"
@@ -481,6 +481,7 @@ def provenance(
         "Conventions": CONVENTIONS,
         "title": LAYOUTS[layout].title,
         "source": f"maglev {version('maglev')}",
+        "history": f"written by the stage '{layout}' of maglev {version('maglev')}",
         "references": REFERENCES,
         "axes": AXES,
         "layout": layout,

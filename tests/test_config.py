@@ -1,0 +1,196 @@
+"""Configurations: units in, one sentence out, and the files that are written from the classes."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+from numpy.testing import assert_allclose
+
+from maglev import ConfigError, catalogue, load_config
+from maglev.config import config_text, from_mapping, overlay
+from maglev.measurements import load_measurements
+from maglev.parameters import Config
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (
+            "passage: {sped: 430 km/h}",
+            "passage.sped is not a known key of passage; did you mean 'speed'?",
+        ),
+        ("trian: {}", "trian is not a known key; did you mean 'train'?"),
+        (
+            "passage: {speed: 3 kg}",
+            "passage.speed must be given in m/s or a unit that converts to it, got '3 kg'",
+        ),
+        (
+            "train: {car_body: {mass: -1 kg}}",
+            "train.car_body.mass must be greater than 0 kg, got '-1 kg'",
+        ),
+        (
+            "passage: {speed: 0 km/h}",
+            "passage.speed must be greater than 0 m/s, got '0 km/h'",
+        ),
+        ("passage: {speed: 430}", "passage.speed must carry its unit, such as '430 m/s'"),
+        (
+            "passage: {speed: 3 parsnips}",
+            "passage.speed must be a number with a unit of m/s, got '3 parsnips', "
+            "whose unit is not known",
+        ),
+        ("passage: {speed: 1e999 m/s}", "passage.speed must be finite, got '1e999 m/s'"),
+        ("train: {n_cars: 2.5}", "train.n_cars must be a whole number, got 2.5"),
+        ("train: 5", "train must hold keys and values, got 5"),
+        (
+            "irregularity: {vertical: {law: poewr}}",
+            "irregularity.vertical must have a law among 'power', 'rational', 'german', "
+            "got {law: poewr}",
+        ),
+        (
+            "irregularity: {vertical: {law: rational}}",
+            "irregularity.vertical.numerator is missing",
+        ),
+        (
+            "irregularity: {vertical: {law: german, roughnes: 1 m^2 rad/m}}",
+            "irregularity.vertical.roughnes is not a known key of irregularity.vertical; "
+            "did you mean 'roughness'?",
+        ),
+        (
+            "irregularity: {fade_in: 200 m}",
+            "irregularity.fade_in must not exceed passage.approach = 150 m, got 200 m",
+        ),
+        (
+            "validation: {measurements: nowhere.yaml}",
+            "validation.measurements names a file that does not exist: nowhere.yaml",
+        ),
+    ],
+)
+def test_a_mistake_gets_one_sentence_that_names_the_key(text, sentence):
+    with pytest.raises(ConfigError) as error:
+        from_mapping(yaml.safe_load(text))
+    assert str(error.value) == sentence
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("train: {n_cars: 2\n", r"bad\.yaml, line 2, column 1: "),
+        ("- a\n- b\n", r"bad\.yaml must hold keys and values"),
+        ("seed: 1\nseed: 2\n", r"bad\.yaml, line 2, column 1: the key 'seed' stands twice"),
+        ("extends: bad.yaml\n", r"bad\.yaml extends itself"),
+        ("extends: none.yaml\n", r"none\.yaml cannot be read: no such file or directory"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_named(tmp_path, text, sentence):
+    path = tmp_path / "bad.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=sentence):
+        load_config(path)
+
+
+def test_a_speed_may_be_given_in_any_unit_of_speed():
+    assert_allclose(from_mapping({"passage": {"speed": "120 m/s"}}).passage.speed, 120)
+    assert_allclose(from_mapping({"passage": {"speed": "432 km/h"}}).passage.speed, 120)
+
+
+def test_a_key_left_out_keeps_the_default_of_its_own_place():
+    lighter = from_mapping({"train": {"guidance_magnet": {"mass": "380 kg"}}})
+    expected = Config().train.guidance_magnet.model_copy(update={"mass": 380.0})
+    assert lighter.train.guidance_magnet == expected
+
+
+def test_later_files_overlay_earlier_ones_and_extends_names_the_lowest(tmp_path):
+    (tmp_path / "base.yaml").write_text("seed: 1\ntrain: {n_cars: 2, car_body: {mass: 30 t}}\n")
+    (tmp_path / "over.yaml").write_text("extends: base.yaml\ntrain: {n_cars: 3}\n")
+    (tmp_path / "last.yaml").write_text("seed: 7\n")
+    config = load_config(tmp_path / "over.yaml", tmp_path / "last.yaml")
+    assert (config.seed, config.train.n_cars) == (7, 3)
+    assert_allclose(config.train.car_body.mass, 30_000)
+
+
+def test_another_law_replaces_the_spectrum_below_it_as_a_whole():
+    base = {"irregularity": {"vertical": {"law": "power", "exponent": 2.0}}}
+    over = {"irregularity": {"vertical": {"law": "german"}}}
+    assert overlay(base, over) == over
+
+
+def test_names_of_files_are_relative_to_the_file_they_stand_in(tmp_path, monkeypatch):
+    (tmp_path / "there").mkdir()
+    (tmp_path / "there" / "profile.csv").write_text("x,vertical,lateral\n")
+    there = tmp_path / "there" / "c.yaml"
+    there.write_text("irregularity: {profile_file: profile.csv}\n")
+    monkeypatch.chdir(tmp_path)
+    config = load_config("there/c.yaml")
+    assert config.irregularity.profile_file == "there/profile.csv"
+    (tmp_path / "copy").mkdir()
+    part = {"irregularity": config.quantities()["irregularity"]}
+    (tmp_path / "copy" / "c.yaml").write_text(config_text(part, "copy"))
+    assert load_config("copy/c.yaml").irregularity == config.irregularity
+
+
+def test_what_is_written_reads_back_the_same(tmp_path):
+    config = load_config(ROOT / "config" / "quick.yaml")
+    (tmp_path / "c.yaml").write_text(config_text(config.quantities(), tmp_path))
+    again = load_config(tmp_path / "c.yaml")
+    assert again.model_copy(update={"validation": config.validation}) == config
+
+
+def test_the_shipped_configuration_states_every_default():
+    text = (ROOT / "config" / "config.yaml").read_text(encoding="utf-8")
+    assert text == catalogue.default_config(), "run `make docs`"
+    shipped = load_config(ROOT / "config" / "config.yaml")
+    measurements = Config().validation.measurements
+    assert Path(shipped.validation.measurements).name == Path(measurements).name
+    assert shipped.model_copy(update={"validation": Config().validation}) == Config()
+
+
+@pytest.mark.parametrize(
+    ("name", "made"),
+    [
+        ("workflow/schemas/config.schema.yaml", catalogue.schema),
+        ("docs/parameters.md", catalogue.parameter_tables),
+        ("docs/datasets.md", catalogue.dataset_tables),
+    ],
+)
+def test_files_written_from_the_classes_are_current(name, made):
+    assert (ROOT / name).read_text(encoding="utf-8") == made(), "run `make docs`"
+
+
+def test_the_schema_accepts_the_defaults_and_refuses_what_it_does_not_know():
+    schema = yaml.safe_load(catalogue.schema())
+    Draft202012Validator.check_schema(schema)
+    validator = Draft202012Validator(schema)
+    assert validator.is_valid(Config().quantities())
+    assert not validator.is_valid({"passage": {"sped": "430 km/h"}})
+    assert not validator.is_valid({"passage": {"speed": 430}})
+
+
+def test_every_key_of_the_schema_has_a_description_and_no_object_is_open():
+    def check(node, path):
+        if node.get("type") == "object":
+            assert node["additionalProperties"] is False, path
+            for name, inner in node["properties"].items():
+                assert inner.get("description"), f"{path}.{name}"
+                check(inner, f"{path}.{name}")
+        for inner in node.get("oneOf", ()):
+            check(inner, path)
+
+    check(yaml.safe_load(catalogue.schema()), "config")
+
+
+def test_the_measurements_are_read_with_unit_source_and_confidence():
+    measured = load_measurements(ROOT / "config" / "measurements" / "shanghai.yaml")
+    assert_allclose(measured.first_vertical_frequency.value, 10.35)
+    (peak,) = measured.peak_deflection
+    assert_allclose([peak.value, peak.speed], [1.712e-3, 300 / 3.6])
+    assert peak.confidence == "low"
+
+
+def test_a_measurement_without_its_unit_is_refused(tmp_path):
+    text = (ROOT / "config" / "measurements" / "shanghai.yaml").read_text()
+    (tmp_path / "m.yaml").write_text(text.replace("1.712 mm", "1.712"))
+    with pytest.raises(ConfigError, match=r"peak_deflection\.0\.value must carry its unit"):
+        load_measurements(tmp_path / "m.yaml")

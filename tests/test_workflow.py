@@ -1,0 +1,130 @@
+"""The workflow: what it would do, what it does again, and what it leaves alone."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PARTS = ("Snakefile", "profiles", "workflow", "config", "src")
+CONFIG = """\
+extends: config.yaml
+run: test
+train: {n_cars: 1}
+guideway: {n_spans: 1}
+irregularity: {n_harmonics: 50, wavelength_max: 20 m}
+"""
+
+
+class Workplace:
+    """A copy of the project, with a small configuration, in which Snakemake runs."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        for part in PARTS:
+            source, target = ROOT / part, folder / part
+            if source.is_dir():
+                shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
+            else:
+                shutil.copy(source, target)
+        (folder / "config" / "test.yaml").write_text(CONFIG)
+
+    def snakemake(self, *arguments, config="config/test.yaml"):
+        """Exit code and everything printed."""
+        command = ["snakemake", *arguments, "--configfile", config]
+        environment = os.environ | {"PYTHONPATH": str(self.folder / "src")}
+        done = subprocess.run(
+            command, cwd=self.folder, env=environment, capture_output=True, text=True, check=False
+        )
+        return done.returncode, done.stdout + done.stderr
+
+    def would_run(self, *arguments):
+        """Names of the rules that a dry run lists, with their numbers of jobs."""
+        code, text = self.snakemake(*arguments, "--dry-run")
+        assert code == 0, text
+        if "Nothing to be done" in text:
+            return {}
+        table = text.split("Job stats:")[1].split("total")[0].splitlines()[3:]
+        return {line.split()[0]: int(line.split()[1]) for line in table if line.strip()}
+
+
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory):
+    """A workplace in which nothing has run."""
+    return Workplace(tmp_path_factory.mktemp("fresh"))
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """A workplace in which Fig. 7 was drawn."""
+    workplace = Workplace(tmp_path_factory.mktemp("drawn"))
+    code, text = workplace.snakemake("fig7")
+    assert code == 0, text
+    return workplace
+
+
+def test_a_dry_run_of_all_lists_every_step_of_the_method(fresh):
+    jobs = fresh.would_run("all")
+    assert jobs == {
+        "run_config": 1, "stage_config": 5, "irregularity": 1, "guideway_modes": 1, "passage": 1,
+        "deflection": 1, "dynamic_factor": 1, "fig7": 1, "fig8": 1, "histories": 1, "gaps": 1,
+        "modes": 1, "all": 1,
+    }  # fmt: skip
+    assert fresh.would_run() == jobs
+
+
+def test_a_single_figure_needs_only_its_own_chain(fresh):
+    assert fresh.would_run("modes") == {"stage_config": 1, "guideway_modes": 1, "modes": 1}
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("passage: {speed: 0 km/h}", "passage.speed must be greater than 0 m/s, got '0 km/h'"),
+        ("pasage: {}", "pasage is not a known key; did you mean 'passage'?"),
+        (
+            "validation: {measurements: measurements/none.yaml}",
+            "validation.measurements names a file that does not exist: "
+            "config/measurements/none.yaml",
+        ),
+    ],
+)
+def test_a_mistake_in_the_configuration_is_one_sentence_without_a_traceback(fresh, line, sentence):
+    (fresh.folder / "config" / "bad.yaml").write_text(line)
+    code, text = fresh.snakemake("all", "--dry-run", config="config/bad.yaml")
+    assert code == 1
+    assert sentence in text
+    assert "Traceback" not in text
+
+
+def test_after_a_run_there_is_nothing_to_be_done(drawn):
+    figures = drawn.folder / "results" / "test" / "figures"
+    assert sorted(path.name for path in figures.iterdir()) == ["fig7.nc", "fig7.pdf", "fig7.png"]
+    assert drawn.would_run("fig7") == {}
+
+
+def test_a_comment_or_a_docstring_reruns_nothing(drawn):
+    path = drawn.folder / "src" / "maglev" / "mechanics" / "irregularity.py"
+    text = path.read_text()
+    path.write_text(text.replace('"""', '"""Once more: ', 1) + "\n# a comment\n")
+    assert drawn.would_run("fig7") == {}
+    path.write_text(text)
+
+
+def test_an_edit_reruns_what_stands_on_it(drawn):
+    path = drawn.folder / "src" / "maglev" / "mechanics" / "irregularity.py"
+    text = path.read_text()
+    path.write_text(text + "\nEXTRA = 1\n")
+    assert drawn.would_run("fig7") == {"irregularity": 1, "fig7": 1}
+    path.write_text(text)
+
+
+def test_a_value_reruns_only_the_stages_that_read_it(drawn):
+    path = drawn.folder / "config" / "test.yaml"
+    path.write_text(CONFIG + "gains: {suspension_proportional: 3400 A/m}\n")
+    assert drawn.would_run("fig7") == {}
+    path.write_text(CONFIG + "seed: 5\n")
+    assert drawn.would_run("fig7") == {"stage_config": 1, "irregularity": 1, "fig7": 1}
+    path.write_text(CONFIG)
