@@ -362,7 +362,8 @@ def page(results: xr.Dataset, figure: Path) -> str:
         f"{N_POPULATION} points, so the error is the surrogate's alone; adaptive designs start "
         f"from {N_FIRST} GF points and add {N_BATCH} at a time.  ∞: the estimated probability of "
         f"loss exceeds the level (a gap in the figure).  A design that met no lost sample "
-        "takes that probability as 0: its limit on the cliff is finite, and too low.  The smallest median is bold.",
+        "takes that probability as 0: its limit on the cliff is finite, and too low.  The "
+        "smallest median is bold.",
         "",
         f"![error of the limits against calls]({figure.name})",
         "",
@@ -408,8 +409,8 @@ def page(results: xr.Dataset, figure: Path) -> str:
         "## Time",
         "",
         f"Wall seconds to {N_LARGEST} calls on one core of the machine of the last run, which "
-        "other work may have shared; fits and choices together, median over seeds, slowest function; "
-        "one-stage designs are fitted anew at every size: "
+        "other work may have shared; fits and choices together, median over seeds, slowest "
+        "function; one-stage designs are fitted anew at every size: "
         + ", ".join(f"{design} {float(last.sel(design=design)):.1f}" for design in DESIGNS)
         + ".",
         "",
@@ -483,8 +484,8 @@ def draw(results: xr.Dataset, path: Path) -> None:
                 ax.set_ylabel(f"{problem.title}\nerror / σ")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
-    for suffix in (".png", ".pdf"):
-        figure.savefig(path.with_suffix(suffix), dpi=200)
+    figure.savefig(path.with_suffix(".png"), dpi=200)
+    figure.savefig(path.with_suffix(".pdf"), metadata={"CreationDate": None})
     plt.close(figure)
 
 
