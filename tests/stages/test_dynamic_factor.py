@@ -1,4 +1,4 @@
-"""The sweep of speeds: it resumes, and what it gives does not depend on how often it was stopped."""
+"""The sweep of speeds: it resumes, and stopping it changes nothing in what it gives."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ class Simulated:
         data = {}
         for name in LAYOUTS["passage"].variables:
             shape = tuple(config.train.n_cars if d == "car" else 1 for d in VARIABLES[name].dims)
-            data[name] = (VARIABLES[name].dims, np.zeros(shape))
+            data[name] = (VARIABLES[name].dims, np.zeros(shape, dtype=VARIABLES[name].dtype))
         data["girder_displacement_z"] = (("sample",), [1e-3 + 1e-6 * config.passage.speed])
         return xr.Dataset(data, coords={"sample": [0], "car": [0]})
 
