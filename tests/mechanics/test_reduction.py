@@ -1,0 +1,264 @@
+"""The guideway by its components: what it keeps of the finite elements, and what it may lose."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+from numpy.testing import assert_allclose
+from scipy.sparse.linalg import spsolve
+
+from maglev.mechanics import guideway as full
+from maglev.mechanics.integrate import step_response
+from maglev.mechanics.reduction import SPLINE_INTERVALS, reduce, spline_weights
+from maglev.parameters import Bearing, Guideway, Passage
+
+CUTOFF, ELSEWHERE = Passage().mode_cutoff, Passage().mode_cutoff_elsewhere
+LENGTH = Guideway().span_length
+THREE_SPANS = full.build(Guideway(n_spans=3))
+REDUCED = reduce(THREE_SPANS, CUTOFF, ELSEWHERE)
+MIDDLE = 1
+LOAD = 25e3  # N/m, about a train's weight
+
+
+def undamped(reduced):
+    """Frequencies [Hz] and shapes of unit mass."""
+    squares, shapes = scipy.linalg.eigh(reduced.stiffness.toarray(), reduced.mass.toarray())
+    return np.sqrt(squares) / (2 * np.pi), shapes
+
+
+def damped(reduced):
+    """Frequencies [Hz] and damping ratios of the modes that swing, from the complex roots."""
+    n = reduced.n_coordinates
+    mass, damping, stiffness = (
+        matrix.toarray() for matrix in (reduced.mass, reduced.damping, reduced.stiffness)
+    )
+    state = np.block(
+        [
+            [np.zeros((n, n)), np.eye(n)],
+            [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)],
+        ]
+    )
+    roots = np.linalg.eigvals(state)
+    roots = roots[roots.imag > 0]
+    return np.abs(roots) / (2 * np.pi), -roots.real / np.abs(roots)
+
+
+def places(n):
+    """Midpoints of ``n`` equal parts of a span [m]."""
+    return (np.arange(n) + 0.5) * LENGTH / n
+
+
+def spline_design(x):
+    """Weight of each coefficient at places along a span."""
+    interval = np.floor(x / LENGTH * SPLINE_INTERVALS).astype(int)
+    design = np.zeros((x.size, SPLINE_INTERVALS + 3))
+    weights = spline_weights(x / LENGTH * SPLINE_INTERVALS - interval)
+    np.put_along_axis(design, interval[:, None] + np.arange(4), weights, axis=1)
+    return design
+
+
+def uniform_load(model):
+    """Forces of a uniform load on both rails of all spans."""
+    x = np.concatenate([places(800) + j * LENGTH for j in range(model.parameters.n_spans)])
+    force = np.full(x.size, LOAD / 2 * LENGTH / 800)
+    return sum(model.rail_rows(x, side)[0].T @ force for side in (1, -1))
+
+
+def midspan_deflection(reduced, force):
+    """Of the middle span under static forces on the finite-element model [m]."""
+    motion = spsolve(reduced.stiffness.tocsc(), reduced.basis.T @ force)
+    return reduced.midspan_z @ motion[reduced.span_coordinates[MIDDLE]]
+
+
+STATIC = spsolve(THREE_SPANS.stiffness.tocsc(), uniform_load(THREE_SPANS))
+STATIC_MIDSPAN = (THREE_SPANS.girder_rows([(MIDDLE + 0.5) * LENGTH])[0] @ STATIC)[0]
+
+
+def test_modes_have_unit_mass_and_share_none_with_the_pier_tops():
+    basis, n = REDUCED.basis, REDUCED.n_modes
+    mass = (basis.T @ THREE_SPANS.mass @ basis).toarray()
+    assert_allclose(mass[:n, :n], np.eye(n), atol=1e-10)
+    scale = np.sqrt(mass.diagonal())
+    assert np.abs(mass[:n, n:] / scale[n:]).max() < 1e-10
+    assert_allclose(mass[n:, n:], REDUCED.top_mass, rtol=1e-12, atol=1e-10 * mass.max())
+    assert np.linalg.eigvalsh(REDUCED.top_mass).min() > 0
+    i, j = np.nonzero(REDUCED.top_mass)
+    assert np.abs(i - j).max() < 12  # a pier top meets its neighbours alone
+
+
+def test_stiffness_is_symmetric_and_that_of_the_finite_elements_in_the_basis():
+    stiffness = REDUCED.stiffness.toarray()
+    scale = np.sqrt(np.outer(stiffness.diagonal(), stiffness.diagonal()))
+    assert_allclose(stiffness / scale, stiffness.T / scale, atol=1e-11)
+    exact = (REDUCED.basis.T @ THREE_SPANS.stiffness @ REDUCED.basis).toarray()
+    assert_allclose(stiffness / scale, exact / scale, atol=1e-11)
+    assert np.linalg.eigvalsh(stiffness / scale).min() > 0
+
+
+def test_no_mode_leaves_its_span_or_pier():
+    for j, columns in enumerate(REDUCED.span_coordinates):
+        own = columns[columns < REDUCED.n_modes]
+        moved = np.unique(REDUCED.basis[:, own].tocoo().coords[0])
+        assert np.isin(moved, THREE_SPANS.span_dof[j]).all()
+        tops = columns[columns >= REDUCED.n_modes] - REDUCED.n_modes
+        assert_allclose(tops, 6 * j + np.arange(12))
+
+
+def test_frequencies_are_those_of_the_finite_elements():
+    """Within 0.1 % below 50 Hz and 0.3 % below 100 Hz, but for a few modes off the rails.
+
+    A mode leaves the rails at rest where piers or girders stretch and sway along the line; the
+    train does not feel it.
+    """
+    expected, shapes = full.modes(THREE_SPANS, 100.0)
+    found = undamped(REDUCED)[0]
+    assert (found < 100.0).sum() == expected.size
+    error = found[: expected.size] / expected - 1
+    x = np.concatenate([places(64) + j * LENGTH for j in range(3)])
+    u_z, _, u_y, _ = THREE_SPANS.rail_rows(x, 1)
+    motion = np.abs(np.vstack([u_z @ shapes, u_y @ shapes])).max(axis=0)
+    felt = motion > 0.05 * motion.max()
+    assert error[felt & (expected < 50.0)].max() < 1e-3
+    assert error[felt].max() < 3e-3
+    assert error.max() < 1e-2
+    assert error.min() > -1e-9  # coordinates left out can only stiffen
+
+
+def test_frequencies_come_closer_with_the_cutoff_elsewhere():
+    expected = full.modes(THREE_SPANS, 100.0)[0]
+    errors = [
+        (undamped(reduce(THREE_SPANS, CUTOFF, elsewhere))[0][: expected.size] / expected - 1).max()
+        for elsewhere in (150.0, ELSEWHERE, 2000.0)
+    ]
+    assert errors[2] < 1e-3 < errors[1] < errors[0]
+
+
+def test_every_mode_below_the_cutoff_has_the_damping_of_the_configuration():
+    """Bearings without damping of their own, which comes on top."""
+    model = full.build(Guideway(n_spans=3, bearing=Bearing(damping="0 N s/m")))
+    frequency, ratio = damped(reduce(model, CUTOFF, ELSEWHERE))
+    below = frequency < 0.99 * CUTOFF
+    assert below.sum() > 100
+    assert_allclose(ratio[below], 0.025, rtol=2e-2)
+    assert_allclose(ratio[frequency < 100.0], 0.025, rtol=5e-3)
+
+
+def test_bearings_damp_on_top_what_they_damp_in_the_finite_elements():
+    model = full.build(Guideway(n_spans=3, bearing=Bearing(damping="0 N s/m")))
+    bare = reduce(model, CUTOFF, ELSEWHERE)
+    shapes = undamped(REDUCED)[1]
+    added = np.einsum("ik,ij,jk->k", shapes, (REDUCED.damping - bare.damping).toarray(), shapes)
+    moved = REDUCED.basis @ shapes
+    expected = np.einsum("ik,ik->k", moved, THREE_SPANS.bearing_damping @ moved)
+    rate = np.einsum("ik,ij,jk->k", shapes, REDUCED.damping.toarray(), shapes)
+    assert np.abs((added - expected) / rate).max() < 5e-3
+    assert (expected / rate).max() > 0.2
+
+
+def test_damping_takes_energy_from_every_motion_and_keeps_its_absolute_rate_beyond_the_cutoff():
+    low = reduce(THREE_SPANS, 60.0, ELSEWHERE)
+    for reduced in (REDUCED, low):
+        damping = reduced.damping.toarray()
+        assert_allclose(damping, damping.T, atol=1e-12 * np.abs(damping).max())
+        assert np.linalg.eigvalsh(damping).min() > 0
+    model = full.build(Guideway(n_spans=3, bearing=Bearing(damping="0 N s/m")))
+    frequency, ratio = damped(reduce(model, 60.0, ELSEWHERE))
+    beyond = (frequency > 61.0) & (frequency < ELSEWHERE)
+    assert beyond.sum() > 10
+    assert_allclose(ratio[beyond] * frequency[beyond], 0.025 * 60.0, rtol=2e-2)
+
+
+def test_static_deflection_under_a_uniform_load_is_that_of_the_finite_elements():
+    assert 1.4e-3 < STATIC_MIDSPAN < 1.8e-3  # m
+    assert_allclose(
+        midspan_deflection(REDUCED, uniform_load(THREE_SPANS)), STATIC_MIDSPAN, rtol=1e-3
+    )
+
+
+def test_static_deflection_hangs_on_no_cutoff():
+    force = uniform_load(THREE_SPANS)
+    chosen = midspan_deflection(REDUCED, force)
+    for cutoffs in ((CUTOFF, CUTOFF), (CUTOFF, 60.0), (200.0, ELSEWHERE)):
+        other = midspan_deflection(reduce(THREE_SPANS, *cutoffs), force)
+        assert_allclose(other, chosen, rtol=2e-4)
+    elsewhere = midspan_deflection(reduce(THREE_SPANS, CUTOFF, CUTOFF), force)
+    assert_allclose(elsewhere, chosen, rtol=1e-5)
+
+
+def test_a_load_on_the_splines_deflects_like_a_load_on_the_rails():
+    force = np.zeros(REDUCED.n_coordinates)
+    pattern = spline_design(places(800)).sum(axis=0) * LOAD * LENGTH / 800
+    for columns, shape in zip(REDUCED.span_coordinates, REDUCED.rail_z, strict=True):
+        force[columns] += shape @ pattern
+    motion = spsolve(REDUCED.stiffness.tocsc(), force)
+    deflection = REDUCED.midspan_z @ motion[REDUCED.span_coordinates[MIDDLE]]
+    assert_allclose(deflection, STATIC_MIDSPAN, rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["rail_z", "rail_roll", "rail_y"])
+def test_splines_carry_the_rails_motion_in_every_mode_below_50_hz(name):
+    """Within 3 % of its root mean square: the splines bridge the joints of the rails' units."""
+    x = places(960)
+    design = spline_design(x)
+    for j in range(3):
+        right, left = (THREE_SPANS.rail_rows(x + j * LENGTH, side) for side in (1, -1))
+        rows = {
+            "rail_z": (right[0] + left[0]) / 2,
+            "rail_roll": (right[0] - left[0]) / 2,
+            "rail_y": (right[2] + left[2]) / 2,
+        }[name]
+        columns = REDUCED.span_coordinates[j]
+        frequency = np.sqrt(REDUCED.stiffness.diagonal()[columns]) / (2 * np.pi)
+        exact = rows @ REDUCED.basis[:, columns].toarray()
+        found = design @ getattr(REDUCED, name)[j].T
+        size = np.sqrt((exact**2).mean(axis=0))
+        error = np.sqrt(((found - exact) ** 2).mean(axis=0))
+        of_modes = (columns < REDUCED.n_modes) & (frequency < 50.0)
+        moving = of_modes & (size > 1e-3 * size[of_modes].max())
+        assert moving.sum() >= 2
+        assert (error[moving] / size[moving]).max() < 0.03
+
+
+def test_splines_carry_the_rails_deflection_under_a_uniform_load():
+    x = places(960)
+    motion = spsolve(REDUCED.stiffness.tocsc(), REDUCED.basis.T @ uniform_load(THREE_SPANS))
+    for j, columns in enumerate(REDUCED.span_coordinates):
+        found = spline_design(x) @ (REDUCED.rail_z[j].T @ motion[columns])
+        exact = THREE_SPANS.rail_rows(x + j * LENGTH, 1)[0] @ STATIC
+        assert np.abs(found - exact).max() < 5e-3 * exact.max()
+
+
+def test_spline_weights_share_out_one_and_join_smoothly():
+    u = np.linspace(0.0, 1.0, 101)
+    weights = spline_weights(u)
+    assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-14)
+    assert weights.min() >= 0
+    assert_allclose(weights @ np.arange(4), 1.0 + u, rtol=1e-13)  # a straight line stays straight
+    assert_allclose(weights[-1], [0.0, *weights[0, :3]], atol=1e-15)
+    h = 1e-4
+    start, end = (
+        spline_weights(np.array([0.0, h, 2 * h])),
+        spline_weights(1 - np.array([0, h, 2 * h])),
+    )
+    slope_start = (-3 * start[0] + 4 * start[1] - start[2]) / (2 * h)
+    slope_end = (3 * end[0] - 4 * end[1] + end[2]) / (2 * h)
+    assert_allclose(slope_end, [0.0, *slope_start[:3]], atol=1e-7)
+
+
+@pytest.mark.parametrize("step", [0.1e-3, 0.25e-3, 1e-3])
+def test_the_stepped_share_of_the_acceleration_makes_an_isolated_mode_exact(step):
+    """x(t + Δt) - 2 x + x(t - Δt) = Δt² sinc²(ωΔt/2) (f - ω² x), also for ωΔt beyond 2."""
+    response = step_response(REDUCED, step)
+    omega = np.sqrt(REDUCED.stiffness.diagonal()[: REDUCED.n_modes])
+    force, amplitude, phase = 3.0, 0.7, 0.4
+
+    def exact(t):
+        return force / omega**2 + amplitude * np.cos(omega * t + phase)
+
+    acceleration = force - omega**2 * exact(0.0)
+    left = exact(step) - 2 * exact(0.0) + exact(-step)
+    assert_allclose(
+        left, step**2 * response[: omega.size] * acceleration, atol=1e-13 * np.abs(left).max()
+    )
+    assert np.all(response[omega.size :] == 1.0)
+    if step == 1e-3:
+        assert (omega * step).max() > 2
