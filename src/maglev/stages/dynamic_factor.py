@@ -43,15 +43,16 @@ def _at_speed(config: Config, speed: float) -> Config:
     return config.model_copy(update={"passage": passage})
 
 
-def _passage(config: Config, store: Path, code: str) -> xr.Dataset:
-    """Extremes of one passage at the mean gains, from the store or else computed and kept."""
+def _passage(config: Config, store: Path, code: str) -> tuple[xr.Dataset, bool]:
+    """Extremes of one passage at the mean gains; whether they were computed, not found kept."""
     content = config_slice(config.quantities(), "passage")
     key = json.dumps([content, code], sort_keys=True).encode()
     path = store / f"{hashlib.sha256(key).hexdigest()[:16]}.nc"
-    if not path.is_file():
+    is_new = not path.is_file()
+    if is_new:
         computed = simulate(config, np.array([config.gains.as_row]))
         datasets.write(computed, path, "passage", config=content, code=code)
-    return datasets.read(path, "passage")
+    return datasets.read(path, "passage"), is_new
 
 
 def dataset(config: Config, store: str | Path) -> xr.Dataset:
@@ -82,16 +83,20 @@ def dataset(config: Config, store: str | Path) -> xr.Dataset:
     code = code_of("simulation")
     sweep = speeds(config)
     peaks, status = np.empty(sweep.size), np.empty(sweep.size, dtype=int)
-    began = time.perf_counter()
+    n_new, seconds = 0, 0.0
     for k, speed in enumerate(sweep):
-        one = _passage(_at_speed(config, speed), Path(store), code)
+        began = time.perf_counter()
+        one, is_new = _passage(_at_speed(config, speed), Path(store), code)
+        if is_new:
+            n_new, seconds = n_new + 1, seconds + time.perf_counter() - began
         peaks[k] = one["girder_displacement_z"].item()
         status[k] = one["status"].item()
-        each = (time.perf_counter() - began) / (k + 1)
+        each = seconds / max(n_new, 1)
         _LOG.info(
-            "%d of %d speeds done, %.2f s each, %.0f s left",
+            "%d of %d speeds done (%d found), %.2f s each, %.0f s left",
             k + 1,
             sweep.size,
+            k + 1 - n_new,
             each,
             each * (sweep.size - k - 1),
         )
