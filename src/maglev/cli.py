@@ -134,8 +134,9 @@ def deflection(configs: tuple[Path, ...], passage: Path, out: Path) -> None:
 @main.command("dynamic-factor")
 @_config
 @click.option("--store", type=_File, required=True, help="Folder that keeps the passages.")
+@click.option("--threads", type=click.IntRange(1), default=1, help="Passages at the same time.")
 @_out
-def dynamic_factor(configs: tuple[Path, ...], store: Path, out: Path) -> None:
+def dynamic_factor(configs: tuple[Path, ...], store: Path, threads: int, out: Path) -> None:
     """Compute passages over a range of speeds, or go on with a sweep that was stopped."""
     from maglev.config import load_config
     from maglev.stages import dynamic_factor, save
@@ -145,7 +146,7 @@ def dynamic_factor(configs: tuple[Path, ...], store: Path, out: Path) -> None:
     profile = parameters.irregularity.profile_file
     if profile:
         inputs["profile"] = profile
-    result = dynamic_factor.dataset(parameters, store)
+    result = dynamic_factor.dataset(parameters, store, threads)
     save(result, out, "dynamic_factor", parameters, inputs)
 
 

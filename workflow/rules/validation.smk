@@ -18,7 +18,6 @@ rule passage:
     message:
         "Run the train over the guideway at the configured speed"
     shell:
-        "NUMBA_NUM_THREADS={threads} "
         "maglev passage --config {input.config} --out {output} 2> {log}"
 
 
@@ -56,12 +55,12 @@ rule dynamic_factor:
         "<benchmarks>/dynamic_factor.tsv"
     conda:
         "../envs/maglev.yaml"
+    threads: 2
     params:
         code=code_of("stages.dynamic_factor"),
         store=f"results/.store/{config['run']}/passages",
     message:
         "Sweep the speed for the dynamic coefficient"
     shell:
-        "NUMBA_NUM_THREADS={threads} "
         "maglev dynamic-factor --config {input.config} --store {params.store} "
-        "--out {output} 2> {log}"
+        "--threads {threads} --out {output} 2> {log}"

@@ -11,6 +11,7 @@ import json
 import logging
 import math
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +56,34 @@ def _passage(config: Config, store: Path, code: str) -> tuple[xr.Dataset, bool]:
     return datasets.read(path, "passage"), is_new
 
 
-def dataset(config: Config, store: str | Path) -> xr.Dataset:
+def _passages(config: Config, sweep: np.ndarray, store: Path, n_threads: int) -> list[xr.Dataset]:
+    """Extremes of one passage at each speed; says how far it is after each.
+
+    The time left assumes that a passage takes as long as the train needs, in proportion 1 / speed.
+    """
+    code = code_of("simulation")
+    began, work_done, n_new = time.perf_counter(), 0.0, 0
+    passages = []
+    with ThreadPoolExecutor(n_threads) as pool:
+        found = pool.map(lambda speed: _passage(_at_speed(config, speed), store, code), sweep)
+        for k, (one, is_new) in enumerate(found):
+            passages.append(one)
+            if is_new:
+                n_new, work_done = n_new + 1, work_done + 1 / sweep[k]
+            seconds = time.perf_counter() - began
+            left = seconds * np.sum(1 / sweep[k + 1 :]) / work_done if n_new else 0.0
+            _LOG.info(
+                "%d of %d speeds done (%d of them found), %.2f s each, %.0f s left",
+                k + 1,
+                sweep.size,
+                k + 1 - n_new,
+                seconds / max(n_new, 1),
+                left,
+            )
+    return passages
+
+
+def dataset(config: Config, store: str | Path, n_threads: int = 1) -> xr.Dataset:
     """Largest deflection and dynamic coefficient at each speed, beside measurement and closed form.
 
     Parameters
@@ -64,6 +92,8 @@ def dataset(config: Config, store: str | Path) -> xr.Dataset:
         The configuration; its ``passage.speed`` plays no part.
     store
         Folder in which the passages are kept.
+    n_threads
+        Passages computed at the same time; the numbers do not depend on it.
 
     Returns
     -------
@@ -80,26 +110,10 @@ def dataset(config: Config, store: str | Path) -> xr.Dataset:
     measured = load_measurements(config.validation.measurements).peak_deflection
     beam, load = euler_span(config), load_per_length(config)
     static = largest_deflection(guideway.build(config.guideway), train.build(config.train))
-    code = code_of("simulation")
     sweep = speeds(config)
-    peaks, status = np.empty(sweep.size), np.empty(sweep.size, dtype=int)
-    n_new, seconds = 0, 0.0
-    for k, speed in enumerate(sweep):
-        began = time.perf_counter()
-        one, is_new = _passage(_at_speed(config, speed), Path(store), code)
-        if is_new:
-            n_new, seconds = n_new + 1, seconds + time.perf_counter() - began
-        peaks[k] = one["girder_displacement_z"].item()
-        status[k] = one["status"].item()
-        each = seconds / max(n_new, 1)
-        _LOG.info(
-            "%d of %d speeds done (%d found), %.2f s each, %.0f s left",
-            k + 1,
-            sweep.size,
-            k + 1 - n_new,
-            each,
-            each * (sweep.size - k - 1),
-        )
+    passages = _passages(config, sweep, Path(store), n_threads)
+    peaks = np.array([one["girder_displacement_z"].item() for one in passages])
+    status = np.array([one["status"].item() for one in passages])
     lost = np.flatnonzero(status != 0)
     if lost.size:
         _LOG.warning(
