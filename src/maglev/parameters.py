@@ -752,7 +752,7 @@ class Passage(Parameters):
         "Hz",
         "highest mode of the middle span, where responses are taken, in the production solver; "
         "damping is a share of critical up to here",
-        850,
+        500,
         source="D",
         confidence="M",
         above=0,
@@ -760,18 +760,26 @@ class Passage(Parameters):
     mode_cutoff_elsewhere: float = quantity(
         "Hz",
         "highest mode of piers and other spans in the production solver",
-        300,
+        400,
         source="D",
         confidence="M",
         above=0,
     )
     acceleration_band: float | None = quantity(
         "Hz",
-        "corner of the second-order Butterworth low-pass on guideway accelerations; null: raw",
+        "corner of the Butterworth low-pass on guideway accelerations; null: raw",
         100,
         source="A",
         confidence="M",
         above=0,
+    )
+    acceleration_filter_order: int = Field(
+        8,
+        description="order of that low-pass, even; with 2 the pole passing above the band leaks "
+        "through and decides the extreme",
+        ge=2,
+        multiple_of=2,
+        json_schema_extra={"unit": "", "source": "A", "confidence": "M"},
     )
     gap_contact: float = quantity(
         "m", "gap at which magnet and rail touch", "0.5 mm", source="A", confidence="M", above=0

@@ -55,8 +55,7 @@ class Line(NamedTuple):
 
     n_spans: int
     span_length: float
-    intervals: int  # splines' intervals a span
-    stride: int  # rows of spline coefficients a span, at least intervals + 3, a multiple of 4
+    stride: int  # rows of rail coefficients a span, a multiple of 4
     upright_start: np.ndarray  # (span + 1,)
     upright_felt: np.ndarray  # (span,) end of those slow enough for a magnet to feel
     upright: np.ndarray  # coordinates that move a span's rails up and down
@@ -87,9 +86,9 @@ class Places(NamedTuple):
     """What a pole of one kind meets at every place it can be at after a whole number of steps."""
 
     number: np.ndarray  # (row, pole) place at time zero; each step moves on by one
-    base: np.ndarray  # (place,) first spline coefficient, -1 off the guideway
-    weight: np.ndarray  # (place, 4) of the splines' motion
-    rise: np.ndarray  # (place, 4) of the splines' motion in its rate at the pole [1/s]
+    base: np.ndarray  # (place,) first of four rail coefficients, -1 off the guideway
+    weight: np.ndarray  # (place, 4) of the coefficients in the rail's motion at the pole
+    rise: np.ndarray  # (place, 4) of the coefficients in the rate of its motion at the pole [1/s]
     rail: np.ndarray  # (place, side) irregularity [m]
     ramp: np.ndarray  # (place, side) its rate at the pole [m/s]
 
@@ -104,8 +103,7 @@ class Run(NamedTuple):
     train_length: float
     gap_contact: float
     gap_lost: float
-    filter_b: np.ndarray  # (3,)
-    filter_a: np.ndarray  # (3,)
+    sections: np.ndarray  # (section, 6) low-pass on guideway accelerations
     record_every: int  # steps between recorded rows; zero: none
 
 
@@ -387,9 +385,8 @@ def passage(
     magnet_max = np.zeros((n_magnets, LANES))
     magnet_gap = np.zeros((n_magnets, LANES))
     magnet_current = np.zeros((n_magnets, LANES))
-    filtered = np.zeros((4, LANES))
-    b0, b1, b2 = run.filter_b[0], run.filter_b[1], run.filter_b[2]
-    a1, a2 = run.filter_a[1], run.filter_a[2]
+    n_sections = run.sections.shape[0]
+    filtered = np.zeros((4 * n_sections, LANES))
     for step in range(1, run.n_steps + 1):
         time = step * dt
         nose = run.start + run.speed * time
@@ -462,10 +459,14 @@ def passage(
                 raw = fma(
                     load(line_acceleration, column), line.midspan_acceleration[direction, k], raw
                 )
-            s1, s2 = load(filtered, 2 * direction), load(filtered, 2 * direction + 1)
-            smooth = fma(raw, b0, s1)
-            store(filtered, 2 * direction, fma(raw, b1, s2) - smooth * a1)
-            store(filtered, 2 * direction + 1, raw * b2 - smooth * a2)
+            smooth = raw
+            for section in range(n_sections):
+                b0, b1, b2, _, a1, a2 = run.sections[section]
+                at = 2 * (direction * n_sections + section)
+                incoming = smooth
+                smooth = fma(incoming, b0, load(filtered, at))
+                store(filtered, at, fma(incoming, b1, load(filtered, at + 1)) - smooth * a1)
+                store(filtered, at + 1, incoming * b2 - smooth * a2)
             _keep_extreme(outcome, direction, shift, time)
             _keep_extreme(outcome, 2 + direction, smooth, time)
             if record:

@@ -29,14 +29,14 @@ from maglev.mechanics.course import n_steps, time_step, track_range
 from maglev.mechanics.irregularity import Profile, displacement
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import (
-    SPLINE_INTERVALS,
+    RAIL_PIECES,
     ReducedGuideway,
+    hermite_slopes,
+    hermite_weights,
     reduce,
-    spline_slopes,
-    spline_weights,
 )
 from maglev.mechanics.responses import Passages, acceleration_filter, checked_gains
-from maglev.parameters import Config, Magnet
+from maglev.parameters import Config, Guideway, Magnet
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -315,13 +315,13 @@ def _magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows
     )
 
 
-def _stride() -> int:
-    """Rows of spline coefficients a span, rounded up to what the kernels do at once."""
-    return -(-(SPLINE_INTERVALS + 3) // 4) * 4
+def _stride(guideway: Guideway) -> int:
+    """Rows of rail coefficients a span, rounded up to what the kernels do at once."""
+    return -(-guideway.rail.units_per_span * 2 * (RAIL_PIECES + 1) // 4) * 4
 
 
 def _places(config: Config, rows: MagnetRows, profile: Profile) -> Places:
-    """Tabulate splines and irregularity where the poles are after whole numbers of steps."""
+    """Tabulate rail pieces and irregularity where the poles are after whole numbers of steps."""
     advance = config.passage.speed * time_step(config)
     start = (rows.x[:, None] + rows.offset - config.passage.approach) / advance
     whole = np.floor(start + 1e-6)
@@ -332,20 +332,22 @@ def _places(config: Config, rows: MagnetRows, profile: Profile) -> Places:
     number = (whole - first).astype(np.int64) + count * np.searchsorted(series, beyond)
     x = ((first + np.arange(count) + series[:, None]) * advance).ravel()
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
-    span = np.floor(x / length).astype(np.int64)
-    on = (span >= 0) & (span < n_spans)
-    local = (x / length - span) * SPLINE_INTERVALS
-    interval = np.clip(np.floor(local).astype(np.int64), 0, SPLINE_INTERVALS - 1)
-    u = local - interval
-    stride = _stride()
-    rate = config.passage.speed * SPLINE_INTERVALS / length
+    n_units = config.guideway.rail.units_per_span
+    unit = np.floor(x / length * n_units + 1e-9).astype(np.int64)
+    on = (unit >= 0) & (unit < n_units * n_spans)
+    local = np.clip((x / length * n_units - unit) * RAIL_PIECES, 0.0, RAIL_PIECES)
+    piece = np.minimum(local.astype(np.int64), RAIL_PIECES - 1)
+    u = local - piece
+    base = (unit // n_units) * _stride(config.guideway)
+    base += (unit % n_units) * 2 * (RAIL_PIECES + 1) + 2 * piece
+    rate = config.passage.speed * n_units * RAIL_PIECES / length
     value, slope = displacement(profile, x)
     kind = slice(2, 4) if rows.is_guidance else slice(0, 2)
     return Places(
         number=number,
-        base=np.where(on, span * stride + interval, -1),
-        weight=np.where(on[:, None], spline_weights(u), 0.0),
-        rise=np.where(on[:, None], spline_slopes(u) * rate, 0.0),
+        base=np.where(on, base, -1),
+        weight=np.where(on[:, None], hermite_weights(u), 0.0),
+        rise=np.where(on[:, None], hermite_slopes(u) * rate, 0.0),
         rail=np.ascontiguousarray(value[kind].T),
         ramp=np.ascontiguousarray(slope[kind].T) * config.passage.speed,
     )
@@ -357,7 +359,7 @@ def _line(reduced: ReducedGuideway, time_step: float, felt: float) -> Line:
     omega = np.zeros(reduced.n_coordinates)  # pier tops first
     omega[: reduced.n_modes] = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes])
     n_coefficients = reduced.rail_z[0].shape[1]
-    stride = _stride()
+    stride = _stride(reduced.parameters)
     least = 1e-9 * max(np.abs(z).max() for z in reduced.rail_z)
 
     def moving(*shapes: Array) -> list[IntArray]:
@@ -402,7 +404,6 @@ def _line(reduced: ReducedGuideway, time_step: float, felt: float) -> Line:
     return Line(
         n_spans=reduced.parameters.n_spans,
         span_length=reduced.parameters.span_length,
-        intervals=SPLINE_INTERVALS,
         stride=stride,
         upright_start=upright_start,
         upright_felt=upright_felt,
@@ -440,7 +441,6 @@ def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, Array]:
 def _run(config: Config, record_every: int) -> Run:
     passage = config.passage
     dt = time_step(config)
-    b, a = acceleration_filter(passage.acceleration_band, dt)
     return Run(
         n_steps=n_steps(config),
         time_step=dt,
@@ -449,8 +449,7 @@ def _run(config: Config, record_every: int) -> Run:
         train_length=config.train.length,
         gap_contact=passage.gap_contact,
         gap_lost=passage.gap_lost,
-        filter_b=b,
-        filter_a=a,
+        sections=np.ascontiguousarray(acceleration_filter(passage, dt)),
         record_every=record_every,
     )
 

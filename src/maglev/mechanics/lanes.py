@@ -22,7 +22,7 @@ from numba.core.typing.templates import Signature
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 LANES = 16
-"""Samples side by side: two AVX-512 or four AVX2 registers of doubles [-]; measured in benchmarks/."""
+"""Samples side by side [-]: two AVX-512 or four AVX2 registers of doubles."""
 
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 

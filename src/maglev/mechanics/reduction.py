@@ -20,9 +20,10 @@ from maglev.parameters import Guideway
 
 Array = npt.NDArray[np.float64]
 
-SPLINE_INTERVALS = 24
-"""Intervals of the cubic B-splines that carry the rails' motion along a span [-]; assumed, checked
-in the convergence table."""
+RAIL_PIECES = 4
+"""Cubic pieces that carry the motion of one unit of rail [-]; assumed, checked in the convergence
+table.  Units join with a kink, and poles that pass kinks one after the other shake the guideway at
+the rate of pole passing: pieces never bridge a joint."""
 
 DAMPING_DROP = 1e-3
 """Entries of the damping matrix below this share of their diagonals are dropped [-]; assumed,
@@ -49,8 +50,9 @@ class ReducedGuideway:
     relative_damping : (coordinate, coordinate)
         Acts on the relative rates of the modes and the rates of the pier tops; sparse.
     rail_z, rail_roll, rail_y : span of (column, coefficient)
-        B-spline coefficients along a span of a rail's vertical motion on the centre line, of the
-        roll times the rail's distance from it, and of its lateral motion, per unit coordinate.
+        Hermite coefficients along a span of a rail's vertical motion on the centre line, of the
+        roll times the rail's distance from it, and of its lateral motion, per unit coordinate:
+        value and slope times piece length at the ends of the pieces, unit after unit.
     midspan_z, midspan_y : (column,)
         Motion of the middle span's girder axis at midspan per unit coordinate.
     basis : (dof, coordinate)
@@ -96,31 +98,27 @@ class ReducedGuideway:
         return (self.relative.T @ self.relative_damping @ self.relative).tocsr()
 
 
-def spline_weights(u: Array) -> Array:
-    """Weights of the four uniform cubic B-splines that live on an interval.
+def hermite_weights(u: Array) -> Array:
+    """Weights of value and slope at the start, value and slope at the end, of a cubic piece.
 
     Parameters
     ----------
     u : (point,)
-        Place in the interval, 0 to 1 [-].
+        Place in the piece, 0 to 1 [-].
 
     Returns
     -------
     weights : (point, 4)
-        Sum to one [-].
-
-    References
-    ----------
-    de Boor, A Practical Guide to Splines (2001), ch. X.
+        Slopes count per piece length [-].
     """
     v = 1.0 - u
-    return np.stack([v**3, 3 * u**3 - 6 * u**2 + 4, 3 * v**3 - 6 * v**2 + 4, u**3], axis=-1) / 6.0
+    return np.stack([(1 + 2 * u) * v**2, u * v**2, u**2 * (3 - 2 * u), -(u**2) * v], axis=-1)
 
 
-def spline_slopes(u: Array) -> Array:
-    """Derivatives of `spline_weights` with respect to the place in the interval (point, 4) [-]."""
+def hermite_slopes(u: Array) -> Array:
+    """Derivatives of `hermite_weights` with respect to the place in the piece (point, 4) [-]."""
     v = 1.0 - u
-    return np.stack([-(v**2), 3 * u**2 - 4 * u, 4 * v - 3 * v**2, u**2], axis=-1) / 2.0
+    return np.stack([-6 * u * v, v * (1 - 3 * u), 6 * u * v, u * (3 * u - 2)], axis=-1)
 
 
 def reduce(
@@ -157,7 +155,7 @@ def reduce(
     basis, carried, columns = _basis(model, kinds, cutoffs)
     n_modes = carried.shape[0]
     mass = (basis.T @ model.mass @ basis).tocsr()
-    splines = {kind: _rail_splines(model, basis, j, columns[j]) for j, kind in enumerate(kinds)}
+    pieces = {kind: _rail_pieces(model, basis, j, columns[j]) for j, kind in enumerate(kinds)}
     at_midspan = [
         (rows @ basis[:, columns[middle]]).toarray().ravel()
         for rows in model.girder_rows(np.array([(middle + 0.5) * length]))
@@ -171,9 +169,9 @@ def reduce(
         stiffness=stiffness,
         carried=carried,
         relative_damping=sp.csr_array(stiffness.shape),
-        rail_z=tuple(splines[kind][0] for kind in kinds),
-        rail_roll=tuple(splines[kind][1] for kind in kinds),
-        rail_y=tuple(splines[kind][2] for kind in kinds),
+        rail_z=tuple(pieces[kind][0] for kind in kinds),
+        rail_roll=tuple(pieces[kind][1] for kind in kinds),
+        rail_y=tuple(pieces[kind][2] for kind in kinds),
         midspan_z=at_midspan[0],
         midspan_y=at_midspan[1],
         basis=basis,
@@ -273,25 +271,28 @@ def _relative_damping(reduced: ReducedGuideway, bearings: Array, cutoff: float) 
     return _pruned(sp.csr_array((relative + relative.T) / 2), DAMPING_DROP)
 
 
-def _rail_splines(
+def _rail_pieces(
     model: full.GuidewayModel,
     basis: sp.csr_array,
     span: int,
     columns: npt.NDArray[np.int64],
 ) -> tuple[Array, Array, Array]:
     """Coefficients (column, coefficient) of the rails' z, roll and y along one span."""
-    length = model.parameters.span_length
-    n = SPLINE_INTERVALS
-    x = (np.arange(24 * n) + 0.5) * (length / (24 * n))
-    interval = np.floor(x / length * n).astype(int)
-    design = np.zeros((x.size, n + 3))
-    weights = spline_weights(x / length * n - interval)
-    np.put_along_axis(design, interval[:, None] + np.arange(4), weights, axis=1)
-    fit = np.linalg.pinv(design)
-    right_z, _, right_y, _ = model.rail_rows(span * length + x, 1)
-    left_z, _, left_y, _ = model.rail_rows(span * length + x, -1)
+    rail, length = model.parameters.rail, model.parameters.span_length
+    unit = length / rail.units_per_span
+    inside = np.linspace(0, 1, RAIL_PIECES + 1)
+    inside[-1] -= 1e-9  # just before the joint
+    x = (span * length + unit * (np.arange(rail.units_per_span)[:, None] + inside)).ravel()
+    right_z, right_slope_z, right_y, right_slope_y = model.rail_rows(x, 1)
+    left_z, left_slope_z, left_y, left_slope_y = model.rail_rows(x, -1)
     shapes = basis[:, columns].toarray()
-    z = (right_z + left_z) @ shapes / 2
-    roll = (right_z - left_z) @ shapes / 2
-    y = (right_y + left_y) @ shapes / 2
-    return (fit @ z).T, (fit @ roll).T, (fit @ y).T
+
+    def coefficients(value: sp.csr_array, slope: sp.csr_array) -> Array:
+        ends = np.stack([value @ shapes, slope @ shapes * (unit / RAIL_PIECES)], axis=1)
+        return ends.reshape(-1, columns.size).T / 2
+
+    return (
+        coefficients(right_z + left_z, right_slope_z + left_slope_z),
+        coefficients(right_z - left_z, right_slope_z - left_slope_z),
+        coefficients(right_y + left_y, right_slope_y + left_slope_y),
+    )

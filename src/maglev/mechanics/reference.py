@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.interpolate import CubicHermiteSpline
-from scipy.signal import lfilter
+from scipy.signal import sosfilt
 from scipy.sparse.linalg import splu
 from tqdm import tqdm
 
@@ -316,8 +316,7 @@ def integrate(
             + (x_g * (model.stiffness @ x_g)).sum(axis=0)
         )
     times = (np.arange(last) + 1) * dt
-    b, a = acceleration_filter(config.passage.acceleration_band, dt)
-    girder[:, 2:] = lfilter(b, a, girder[:, 2:], axis=0)
+    girder[:, 2:] = sosfilt(acceleration_filter(config.passage, dt), girder[:, 2:], axis=0)
     extreme, when = _extremes(girder, times, status)
     extreme_z, when_z = _extremes(body_z, times, status)
     extreme_y, when_y = _extremes(body_y, times, status)

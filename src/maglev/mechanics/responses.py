@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy.signal
 
+from maglev.parameters import Passage
+
 Array = npt.NDArray[np.float64]
 
 GIRDER_RESPONSES = (
@@ -95,27 +97,33 @@ def checked_gains(gains: npt.ArrayLike) -> Array:
     return array
 
 
-def acceleration_filter(band: float | None, time_step: float) -> tuple[Array, Array]:
-    """Coefficients (b, a) of the low-pass on guideway accelerations; the identity without a band.
+def acceleration_filter(passage: Passage, time_step: float) -> Array:
+    """Second-order sections of the low-pass on guideway accelerations; the identity without a band.
 
     Parameters
     ----------
-    band
-        Corner of the second-order Butterworth low-pass [Hz], or ``None``.
+    passage
+        Band and order.
     time_step
         Δt [s].
+
+    Returns
+    -------
+    sections : (section, 6)
+        As `scipy.signal.sosfilt` takes them.
 
     Raises
     ------
     ValueError
         If the band reaches half the sampling rate.
     """
+    band = passage.acceleration_band
     if band is None:
-        return np.array([1.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
+        return np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
     if not band < 0.5 / time_step:
         raise ValueError(
             "passage.acceleration_band must be below half the sampling rate, "
             f"{0.5 / time_step:g} Hz, got {band:g} Hz"
         )
-    b, a = scipy.signal.butter(2, band, fs=1 / time_step)
-    return np.asarray(b), np.asarray(a)
+    order = passage.acceleration_filter_order
+    return np.asarray(scipy.signal.butter(order, band, fs=1 / time_step, output="sos"))
