@@ -752,7 +752,7 @@ class Passage(Parameters):
         "Hz",
         "highest mode of the middle span, where responses are taken, in the production solver; "
         "damping is a share of critical up to here",
-        500,
+        1000,
         source="D",
         confidence="M",
         above=0,

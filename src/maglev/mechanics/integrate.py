@@ -42,6 +42,11 @@ Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
+FELT_FREQUENCY = 400.0
+"""Guideway modes above it do not move the gaps [Hz]; they are driven by the poles all the same.
+Assumed: six times the highest frequency of the train; checked in the convergence table."""
+
+
 @dataclass(frozen=True)
 class System:
     """Everything a passage needs, as the kernels read it."""
@@ -106,7 +111,7 @@ def prepare(config: Config, profile: Profile) -> System:
         guidance=guidance,
         suspension_places=_places(config, suspension, profile),
         guidance_places=_places(config, guidance, profile),
-        line=_line(reduced, time_step(config), config.passage.mode_cutoff_elsewhere),
+        line=_line(reduced, time_step(config)),
         config=config,
     )
 
@@ -353,8 +358,8 @@ def _places(config: Config, rows: MagnetRows, profile: Profile) -> Places:
     )
 
 
-def _line(reduced: ReducedGuideway, time_step: float, felt: float) -> Line:
-    """Guideway for the kernels; magnets feel the motion of its modes up to ``felt`` [Hz]."""
+def _line(reduced: ReducedGuideway, time_step: float) -> Line:
+    """Guideway for the kernels."""
     columns = reduced.span_coordinates
     omega = np.zeros(reduced.n_coordinates)  # pier tops first
     omega[: reduced.n_modes] = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes])
@@ -378,7 +383,7 @@ def _line(reduced: ReducedGuideway, time_step: float, felt: float) -> Line:
         """Start of each span, end of what its magnets feel, and the coordinates."""
         numbers = [column[which] for column, which in zip(columns, chosen, strict=True)]
         start = np.concatenate([[0], np.cumsum([number.size for number in numbers])])
-        slow = [int((omega[number] <= 2 * np.pi * felt).sum()) for number in numbers]
+        slow = [int((omega[number] <= 2 * np.pi * FELT_FREQUENCY).sum()) for number in numbers]
         return start, start[:-1] + slow, np.concatenate(numbers)
 
     upright = moving(reduced.rail_z)
