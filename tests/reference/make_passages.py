@@ -26,8 +26,8 @@ GAIN_FACTORS = np.array([[1.0, 1.0, 1.0, 1.0], [0.85, 1.2, 0.9, 1.1], [1.2, 0.85
 PASSAGES = {
     (430, "irregular"): (5, 5, 0.12e-3),
     (430, "smooth"): (2, 3, 0.12e-3),
-    (200, "irregular"): (2, 3, 0.24e-3),
-    (200, "smooth"): (2, 3, 0.24e-3),
+    (200, "irregular"): (2, 3, 0.12e-3),
+    (200, "smooth"): (2, 3, 0.12e-3),
 }
 """Speed [km/h] and track of each stored passage: its cars, its spans, its largest step [s]."""
 
