@@ -1,5 +1,6 @@
 # make all    environment, then every result and figure     make test   environment, then the tests
 # make quick  the same chain on config/quick.yaml            make check  format, lint, contracts, quick tests
+# make bench  what a passage costs, about seven minutes on an idle machine
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= 2
@@ -12,7 +13,7 @@ export OMP_NUM_THREADS ?= 1
 # what is installed comes from the lock files alone
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: all quick test check docs unlock
+.PHONY: all quick test check bench docs unlock
 .DEFAULT_GOAL := all
 
 $(BIN)/python:
@@ -48,6 +49,10 @@ check: $(VENV)/dev.stamp
 	snakefmt --check Snakefile workflow
 	snakemake --lint
 	pytest --numprocesses $(CORES) -m "not slow"
+
+# alone on the machine; BENCH=--quick for a minute's run
+bench: $(VENV)/core.stamp
+	$(BIN)/python benchmarks/bench_passage.py $(BENCH)
 
 # the files that are written from the code
 docs: $(VENV)/core.stamp
