@@ -50,6 +50,9 @@ TARGET_RATIO, TARGET_STARTUP, TARGET_MINUTES, TARGET_THREADS = 200, 3.0, 10.0, 1
 TARGET_SPANS, TARGET_MEMORY = 4.0, 4.0
 N_PASSAGES = 10_000
 
+BUSY = 0.5
+"""Load average at the start above which the page says that times are not to be trusted [-]."""
+
 STARTUP = """
 import time
 marks = [("begin", time.perf_counter(), time.process_time())]
@@ -723,6 +726,16 @@ def page(results: Results, sizes: Sizes) -> str:
         f"and {config.passage.mode_cutoff_elsewhere:g} Hz elsewhere, rows of {LANES} samples.  "
         "Seconds are process time on one core unless they are called wall.",
         "",
+        *(
+            [
+                "**Other work had the machine at the same time: wall times and the gain of a "
+                "second thread say little, process times are too long.  Run again on an idle "
+                "machine before quoting.**",
+                "",
+            ]
+            if results.load_before[0] > BUSY
+            else []
+        ),
         "## In short",
         "",
         *table(
