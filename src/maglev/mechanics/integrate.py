@@ -29,10 +29,10 @@ from maglev.mechanics.course import n_steps, time_step, track_range
 from maglev.mechanics.irregularity import Profile, displacement
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import (
-    RAIL_PIECES,
     ReducedGuideway,
     hermite_slopes,
     hermite_weights,
+    rail_nodes,
     reduce,
 )
 from maglev.mechanics.responses import Passages, acceleration_filter, checked_gains
@@ -346,7 +346,8 @@ def _magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows
 
 def _stride(guideway: Guideway) -> int:
     """Rows of rail coefficients a span, rounded up to what the kernels do at once."""
-    return -(-guideway.rail.units_per_span * 2 * (RAIL_PIECES + 1) // 4) * 4
+    rail = guideway.rail
+    return -(-rail.units_per_span * 2 * (rail.connectors_per_unit + 2) // 4) * 4
 
 
 def _places(config: Config, rows: MagnetRows, profile: Profile) -> Places:
@@ -364,19 +365,23 @@ def _places(config: Config, rows: MagnetRows, profile: Profile) -> Places:
     n_units = config.guideway.rail.units_per_span
     unit = np.floor(x / length * n_units + 1e-9).astype(np.int64)
     on = (unit >= 0) & (unit < n_units * n_spans)
-    local = np.clip((x / length * n_units - unit) * RAIL_PIECES, 0.0, RAIL_PIECES)
-    piece = np.minimum(local.astype(np.int64), RAIL_PIECES - 1)
-    u = local - piece
+    n_connectors = config.guideway.rail.connectors_per_unit
+    local = np.clip((x / length * n_units - unit) * n_connectors, 0.0, n_connectors)
+    nodes = rail_nodes(n_connectors)
+    piece = np.clip(np.searchsorted(nodes, local, side="right") - 1, 0, nodes.size - 2)
+    extent = np.diff(nodes)[piece]  # of the piece, in connector spacings
+    u = (local - nodes[piece]) / extent
     base = (unit // n_units) * _stride(config.guideway)
-    base += (unit % n_units) * 2 * (RAIL_PIECES + 1) + 2 * piece
-    rate = config.passage.speed * n_units * RAIL_PIECES / length
+    base += (unit % n_units) * 2 * nodes.size + 2 * piece
+    slopes_per_spacing = np.stack([np.ones_like(u), extent, np.ones_like(u), extent], axis=-1)
+    rate = config.passage.speed * n_units * n_connectors / (length * extent[:, None])
     value, slope = displacement(profile, x)
     kind = slice(2, 4) if rows.is_guidance else slice(0, 2)
     return Places(
         number=number,
         base=np.where(on, base, -1),
-        weight=np.where(on[:, None], hermite_weights(u), 0.0),
-        rise=np.where(on[:, None], hermite_slopes(u) * rate, 0.0),
+        weight=np.where(on[:, None], hermite_weights(u) * slopes_per_spacing, 0.0),
+        rise=np.where(on[:, None], hermite_slopes(u) * slopes_per_spacing * rate, 0.0),
         rail=np.ascontiguousarray(value[kind].T),
         ramp=np.ascontiguousarray(slope[kind].T) * config.passage.speed,
     )

@@ -20,11 +20,6 @@ from maglev.parameters import Guideway
 
 Array = npt.NDArray[np.float64]
 
-RAIL_PIECES = 4
-"""Cubic pieces that carry the motion of one unit of rail [-]; assumed, checked in the convergence
-table.  Units join with a kink, and poles that pass kinks one after the other shake the guideway at
-the rate of pole passing: pieces never bridge a joint."""
-
 DAMPING_DROP = 1e-3
 """Entries of the damping matrix below this share of their diagonals are dropped [-]; assumed,
 checked in the tests against the damping ratio of every mode."""
@@ -52,7 +47,7 @@ class ReducedGuideway:
     rail_z, rail_roll, rail_y : span of (column, coefficient)
         Hermite coefficients along a span of a rail's vertical motion on the centre line, of the
         roll times the rail's distance from it, and of its lateral motion, per unit coordinate:
-        value and slope times piece length at the ends of the pieces, unit after unit.
+        value and slope times connector spacing at the nodes of each unit, its ends and connectors.
     midspan_z, midspan_y : (column,)
         Motion of the middle span's girder axis at midspan per unit coordinate.
     basis : (dof, coordinate)
@@ -96,6 +91,16 @@ class ReducedGuideway:
     def damping(self) -> sp.csr_array:
         """Damping matrix (coordinate, coordinate)."""
         return (self.relative.T @ self.relative_damping @ self.relative).tocsr()
+
+
+def rail_nodes(n_connectors: int) -> Array:
+    """Ends and connectors of a unit of rail, from its start in connector spacings (node,) [-].
+
+    Between them the rail is a beam without loads but the poles': cubic pieces from node to node
+    follow it, and none bridges the joint of two units.  Units join with a kink, and poles that pass
+    kinks one after the other shake the guideway at the rate of pole passing.
+    """
+    return np.concatenate([[0.0], np.arange(n_connectors) + 0.5, [float(n_connectors)]])
 
 
 def hermite_weights(u: Array) -> Array:
@@ -279,16 +284,18 @@ def _rail_pieces(
 ) -> tuple[Array, Array, Array]:
     """Coefficients (column, coefficient) of the rails' z, roll and y along one span."""
     rail, length = model.parameters.rail, model.parameters.span_length
-    unit = length / rail.units_per_span
-    inside = np.linspace(0, 1, RAIL_PIECES + 1)
-    inside[-1] -= 1e-9  # just before the joint
-    x = (span * length + unit * (np.arange(rail.units_per_span)[:, None] + inside)).ravel()
+    n_connectors = rail.connectors_per_unit
+    spacing = length / (rail.units_per_span * n_connectors)
+    nodes = rail_nodes(n_connectors)
+    nodes[-1] -= 1e-9  # just before the joint
+    units = n_connectors * np.arange(rail.units_per_span)[:, None]
+    x = span * length + spacing * (units + nodes).ravel()
     right_z, right_slope_z, right_y, right_slope_y = model.rail_rows(x, 1)
     left_z, left_slope_z, left_y, left_slope_y = model.rail_rows(x, -1)
     shapes = basis[:, columns].toarray()
 
     def coefficients(value: sp.csr_array, slope: sp.csr_array) -> Array:
-        ends = np.stack([value @ shapes, slope @ shapes * (unit / RAIL_PIECES)], axis=1)
+        ends = np.stack([value @ shapes, slope @ shapes * spacing], axis=1)
         return ends.reshape(-1, columns.size).T / 2
 
     return (
