@@ -120,6 +120,21 @@ def test_any_number_of_cars_passes_any_number_of_spans(n_cars, n_spans):
         assert 0 < passages[f"{name}_t"] <= n_steps(config) * time_step(config)
 
 
+@pytest.mark.parametrize(("n_cars", "n_spans"), [(1, 2), (6, 2)])
+def test_real_cars_press_real_spans_down_by_some_millimetre_and_a_half(n_cars, n_spans):
+    config = Config.model_validate(
+        {
+            "train": {"n_cars": n_cars},
+            "guideway": {"n_spans": n_spans},
+            "irregularity": {"fade_in": "20 m"},
+            "passage": {"approach": "20 m", "mode_cutoff": "300 Hz"},
+        }
+    )
+    passages = simulate(config, MEAN[None])
+    assert passages["status"] == 0
+    assert 1.4e-3 < passages["girder_displacement_z"] < 1.7e-3
+
+
 def test_a_train_three_times_as_long_as_the_guideway_passes():
     config = small(6, 2)
     passages = simulate(config, MEAN[None])
