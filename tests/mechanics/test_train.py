@@ -267,11 +267,7 @@ def test_a_mode_grows_below_the_static_limit_of_the_gain():
             "train.suspension_magnet.preload must be null",
         ),
         (
-            {
-                "suspension_magnet": Train().suspension_magnet.model_copy(
-                    update={"n_poles": 1}
-                )
-            },
+            {"suspension_magnet": Train().suspension_magnet.model_copy(update={"n_poles": 1})},
             "n_poles must be at least 2",
         ),
         (
