@@ -10,6 +10,7 @@ import hashlib
 import json
 import logging
 import math
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -30,6 +31,9 @@ from maglev.stages.deflection import load_per_length
 from maglev.stages.modes import euler_span
 
 _LOG = logging.getLogger(__name__)
+
+_FILES = threading.Lock()
+"""Held while a file is open: the NetCDF library serves one thread at a time."""
 
 
 def speeds(config: Config) -> np.ndarray:
@@ -52,8 +56,10 @@ def _passage(config: Config, store: Path, code: str) -> tuple[xr.Dataset, bool]:
     is_new = not path.is_file()
     if is_new:
         computed = simulate(config, np.array([config.gains.as_row]))
-        datasets.write(computed, path, "passage", config=content, code=code)
-    return datasets.read(path, "passage"), is_new
+        with _FILES:
+            datasets.write(computed, path, "passage", config=content, code=code)
+    with _FILES:
+        return datasets.read(path, "passage"), is_new
 
 
 def _passages(config: Config, sweep: np.ndarray, store: Path, n_threads: int) -> list[xr.Dataset]:
