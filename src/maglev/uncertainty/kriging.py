@@ -267,15 +267,60 @@ def fit_kriging(points: npt.ArrayLike, values: npt.ArrayLike) -> Kriging:
     Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), ch. 2, 4.2 and 5.4.1.
     """
     points, values = checked_training(points, values)
+    mean, deviation = values.mean(axis=0), values.std(axis=0)
+    likeliest = [_likeliest(points, column) for column in ((values - mean) / deviation).T]
+    found = np.exp(np.array(likeliest))
+    return conditioned_kriging(points, values, length=found[:, 1:], amplitude=found[:, 0])
+
+
+def conditioned_kriging(
+    points: npt.ArrayLike,
+    values: npt.ArrayLike,
+    *,
+    length: npt.ArrayLike,
+    amplitude: npt.ArrayLike,
+) -> Kriging:
+    """Condition processes of known lengths and prior variances on training data: no search.
+
+    Parameters
+    ----------
+    points : (sample, parameter)
+        Standardised training points [-].
+    values : (sample, response) or (sample,)
+        Training values [unit of the response].
+    length : (response, parameter)
+        Length of each input [-], as `Kriging.length`.
+    amplitude : (response,)
+        Prior variance over the squared deviation [-], as `Kriging.amplitude`.
+
+    Returns
+    -------
+    surrogate
+        The surrogate; that of `fit_kriging` if the parameters are those it found.
+
+    Raises
+    ------
+    ValueError
+        As `fit_kriging`, or if lengths or amplitudes do not fit or are not positive.
+
+    References
+    ----------
+    Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), ch. 2.
+    """
+    points, values = checked_training(points, values)
     n, s = points.shape
     mean, deviation = values.mean(axis=0), values.std(axis=0)
     n_responses = mean.size
-    length, amplitude = np.empty((n_responses, s)), np.empty(n_responses)
+    length, amplitude = np.array(length, dtype=float), np.array(amplitude, dtype=float)
+    for what, array, shape in (
+        ("lengths", length, (n_responses, s)),
+        ("amplitudes", amplitude, (n_responses,)),
+    ):
+        if array.shape != shape or not (np.isfinite(array).all() and (array > 0.0).all()):
+            raise ValueError(f"{what} must be positive with shape {shape}, got {array}")
     weights, factor = np.empty((n, n_responses)), np.empty((n_responses, n, n))
     for response in range(n_responses):
         standardised = (values[:, response] - mean[response]) / deviation[response]
-        theta = _likeliest(points, standardised)
-        amplitude[response], length[response] = np.exp(theta[0]), np.exp(theta[1:])
         process = _process(amplitude[response], length[response])
         try:
             process.fit(points, standardised)
