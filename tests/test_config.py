@@ -66,6 +66,61 @@ ROOT = Path(__file__).parents[1]
             "validation: {measurements: nowhere.yaml}",
             "validation.measurements names a file that does not exist: nowhere.yaml",
         ),
+        (
+            "cases: {validation: {coefficient_of_variation: 0}}",
+            "cases.validation.coefficient_of_variation must be greater than 0, got 0",
+        ),
+        (
+            "cases: {validation: {methods: [mcm, amc]}}",
+            "cases.validation.methods.1 must be 'mcm', 'osm', 'asm_paper' or 'asm', got 'amc'",
+        ),
+        (
+            "cases: {validation: {random_gains: [suspension]}}",
+            "cases.validation.random_gains.0 must be 'suspension_proportional', "
+            "'suspension_derivative', 'guidance_proportional' or 'guidance_derivative', "
+            "got 'suspension'",
+        ),
+        (
+            "cases: {validation: {correlation: 0.5}}",
+            "cases.validation.correlation is not supported: the random gains are independent; "
+            "leave it out",
+        ),
+        (
+            "cases: {validation: {n_span: 4}}",
+            "cases.validation.n_span is not a known key of cases.validation; "
+            "did you mean 'n_spans'?",
+        ),
+        (
+            "cases: {validation: {random_track: true}}",
+            "cases.validation.random_track works with the method mcm only, got osm, asm_paper, "
+            "asm: a surrogate of the gains cannot know the track of each sample",
+        ),
+        (
+            "cases: {validation: {coefficient_of_variation: 0.8}}",
+            "cases.validation.coefficient_of_variation = 0.8 leaves only 36 % of the gains "
+            "statically stable (k_p > i0/delta0, k_d >= 0), expected at least half; lower it or "
+            "raise the mean gains",
+        ),
+        (
+            "cases: {New: {}}",
+            "cases.'New' cannot name a case: use small letters, digits and underscores, and none "
+            "of config, track, guideway, figures, tables, checks, report",
+        ),
+        (
+            "study: {asm_paper: {response: girder}}",
+            "study.asm_paper.response must be 'girder_displacement_z', 'girder_displacement_y', "
+            "'girder_acceleration_z', 'girder_acceleration_y', 'car_body_acceleration_z' or "
+            "'car_body_acceleration_y', got 'girder'",
+        ),
+        (
+            "study: {asm: {n_candidates: 50}}",
+            "study.asm.n_candidates must be at least asm.n_largest = 104, got 50: rounds cannot "
+            "choose more runs than there are candidates",
+        ),
+        (
+            "study: {failure_probability: [0.01, 0.1]}",
+            "study.failure_probability must fall from value to value, got [0.01, 0.1]",
+        ),
     ],
 )
 def test_a_mistake_gets_one_sentence_that_names_the_key(text, sentence):
@@ -115,6 +170,23 @@ def test_another_law_replaces_the_spectrum_below_it_as_a_whole():
     base = {"irregularity": {"vertical": {"law": "power", "exponent": 2.0}}}
     over = {"irregularity": {"vertical": {"law": "german"}}}
     assert overlay(base, over) == over
+
+
+def test_null_removes_a_case_and_the_written_configuration_says_so(tmp_path):
+    config = from_mapping({"cases": {"all_gains": None, "mine": {"methods": ["mcm"]}}})
+    assert "all_gains" not in config.cases
+    assert config.cases["mine"].methods == ("mcm",)
+    written = {"cases": config.quantities()["cases"]}
+    (tmp_path / "c.yaml").write_text(config_text(written, tmp_path))
+    assert load_config(tmp_path / "c.yaml").cases == config.cases
+
+
+def test_a_configuration_can_be_hashed_and_a_case_brings_its_spans():
+    config = Config()
+    assert hash(config) == hash(from_mapping({}))
+    assert config.of_case("all_gains").guideway.n_spans == 20
+    with pytest.raises(ValueError, match="there is no case 'al_gains', known are: validation"):
+        config.of_case("al_gains")
 
 
 def test_names_of_files_are_relative_to_the_file_they_stand_in(tmp_path, monkeypatch):

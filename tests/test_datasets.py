@@ -1,13 +1,14 @@
 """Files: they explain themselves, appear whole, and equal data give equal bytes."""
 
 import json
+from typing import get_args
 
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
-from maglev import datasets
+from maglev import datasets, parameters
 from maglev.datasets import LAYOUTS, VARIABLES, describe, read, write
 
 CONFIG = {"seed": 3, "demonstration": False, "passage": {"speed": "100.0 m/s"}}
@@ -16,7 +17,8 @@ CONFIG = {"seed": 3, "demonstration": False, "passage": {"speed": "100.0 m/s"}}
 def filled(layout):
     """A small dataset with every variable of a layout."""
     sizes = {"sample": 2, "car": 2, "magnet": 3, "t": 5, "x": 4, "side": 2, "mode": 3}
-    sizes |= {"wavenumber": 4, "speed": 3, "measured_speed": 1}
+    sizes |= {"wavenumber": 4, "speed": 3, "measured_speed": 1, "response": 6, "parameter": 4}
+    sizes |= {"method": 2, "failure_probability": 3, "round": 2, "step": 3, "cell": 5, "check": 2}
     names = [*LAYOUTS[layout].variables, *LAYOUTS[layout].optional]
     dims = {dim for name in names for dim in VARIABLES[name].dims}
     coords = {dim: np.arange(sizes[dim]) for dim in sorted(dims)}
@@ -43,7 +45,7 @@ def test_what_is_written_reads_back_with_units_and_meaning(tmp_path, layout):
     xr.testing.assert_allclose(found, describe(made))
     for name in found.variables:
         assert found[name].attrs["long_name"], name
-        assert "units" in found[name].attrs or "flag_meanings" in found[name].attrs, name
+        assert {"units", "units_by_response", "flag_meanings"} & set(found[name].attrs), name
 
 
 def test_equal_data_give_equal_bytes_and_no_debris(tmp_path):
@@ -136,3 +138,10 @@ def test_files_follow_the_cf_conventions(tmp_path, layout):
     assert not errors
     messages = [m for r in results if r.value[0] < r.value[1] for m in r.msgs]
     assert not messages
+
+
+def test_the_names_of_responses_and_gains_are_those_of_the_configuration():
+    assert get_args(parameters.Response) == datasets.RESPONSES
+    assert tuple(f"{name}_gain" for name in get_args(parameters.Gain)) == datasets.GAINS
+    assert get_args(parameters.Method) == datasets.METHODS
+    assert (*datasets.SURROGATES, "best") == get_args(parameters.SurrogateKind)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from types import UnionType
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 import yaml
 from pydantic import TypeAdapter
@@ -46,6 +46,14 @@ def _sections(field: FieldInfo) -> tuple[type[Parameters], ...]:
     annotation = field.annotation
     members = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
     return tuple(m for m in members if isinstance(m, type) and issubclass(m, Parameters))
+
+
+def _named_section(field: FieldInfo) -> type[Parameters] | None:
+    """The parameter class of a field that holds sections by name, none for any other field."""
+    if get_origin(field.annotation) is not Mapping:
+        return None
+    section: type[Parameters] = get_args(field.annotation)[1]
+    return section
 
 
 def _extra(field: FieldInfo) -> dict[str, Any]:
@@ -98,6 +106,16 @@ def _config_lines(
                 yield ""
             yield from _commented(f"{pad}{name}:", _summary(type(value)), pad)
             yield from _config_lines(value, _origins(field), indent + 1)
+        elif isinstance(value, Mapping):
+            yield ""
+            yield from _commented(f"{pad}{name}:", field.description or "", pad)
+            for k, (key, section) in enumerate(value.items()):
+                yield from _commented(f"{pad}  {key}:", "" if k else _summary(type(section)), pad)
+                for line in _config_lines(section, {}, indent + 2):
+                    if not k:  # what the keys mean stands at the first
+                        yield line
+                    elif not line.lstrip().startswith("#"):
+                        yield line.split("  # ")[0]
         else:
             words = (_tag(_origin(name, field, origins)), field.description)
             line = f"{pad}{name}: {_yaml_value(_written(field, value))}"
@@ -149,7 +167,17 @@ def _object_schema(
     for name, field in model.model_fields.items():
         value = field.default if parameters is None else getattr(parameters, name)
         sections = _sections(field)
-        if len(sections) == 1:
+        named = _named_section(field)
+        if named is not None:
+            one = {"oneOf": [_object_schema(named, named(), {}), {"type": "null"}]}
+            properties[name] = {
+                "type": "object",
+                "description": field.description,
+                "additionalProperties": False,
+                "properties": {},
+                "patternProperties": {str(_extra(field)["names"]): one},
+            }
+        elif len(sections) == 1:
             properties[name] = _object_schema(sections[0], value, _origins(field))
         elif sections:
             properties[name] = {
@@ -198,6 +226,12 @@ def _parameter_rows(
         value = getattr(parameters, name)
         if isinstance(value, Parameters):
             nested.append((f"{path}.{name}" if path else name, value, _origins(field)))
+            continue
+        named = _named_section(field)
+        if named is not None:
+            nested.append((f"{name}.<name>", named(), {}))
+            shown = ", ".join(f"`{key}`" for key in value)
+            rows.append(f"| `{name}` | {shown} | {field.description} |  |  |")
             continue
         source, confidence = _origin(name, field, origins) or ("", "")
         shown = _yaml_value(_written(field, value))

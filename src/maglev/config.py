@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import UnionType
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 import yaml
 from pydantic import ValidationError
@@ -224,6 +224,7 @@ def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, li
     """Return the dotted place in the file, without the tags of unions, and the keys known there."""
     place: list[str] = []
     candidates: tuple[Any, ...] = (model,)
+    named: Any = None
     for part in loc:
         tagged = [
             c
@@ -235,7 +236,11 @@ def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, li
             continue
         place.append(str(part))
         fields = [c.model_fields[part] for c in candidates if part in c.model_fields]
-        annotation = fields[0].annotation if fields else None
+        annotation = fields[0].annotation if fields else named
+        named = None
+        if get_origin(annotation) is Mapping:  # the next part is a name, behind it a section
+            named, candidates = get_args(annotation)[1], ()
+            continue
         members = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
         candidates = tuple(m for m in members if isinstance(m, type) and issubclass(m, Parameters))
     return ".".join(place), [name for c in candidates for name in c.model_fields]

@@ -46,6 +46,34 @@ GAINS = (
 """The four gains, in the order of the columns of the array that `simulate` takes."""
 
 
+METHODS = ("mcm", "osm", "asm_paper", "asm")
+"""The methods by which the runs of a case are chosen."""
+
+SURROGATES = ("rbf", "scaled_rbf", "kriging")
+"""The kinds of surrogate."""
+
+DECISIONS = (
+    "go_on",
+    "error_below_threshold",
+    "limits_settled",
+    "largest_number_of_runs",
+)
+"""What is decided after a round of an adaptive design."""
+
+LIMIT_STATUS = ("given", "too_few_exceedances", "infinite")
+"""What can be said of a limit."""
+
+TRACK_PARTS = ("gains_only", "track_only", "other_track", "other_gains")
+"""Further runs of a case whose baseline has gains i on track i: gains i on the configured track;
+mean gains on track i; gains i on track n + i; gains n + i on track i (n samples)."""
+
+OF_RESPONSE = "of the response"
+"""In place of a unit: that of the response along ``response``, see `RESPONSE_UNITS`."""
+
+PER_RESPONSE = "one over that of the response"
+"""As `OF_RESPONSE`, for a density."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Variable:
     """One variable of a file: where it lives, in which unit, and what it means.
@@ -55,7 +83,8 @@ class Variable:
     dims
         Names of its dimensions, in order.
     units
-        Unit in the notation of UDUNITS; ``"1"`` for a pure number.
+        Unit in the notation of UDUNITS; ``"1"`` for a pure number; `OF_RESPONSE` or
+        `PER_RESPONSE` for a variable along ``response``, whose rows have each their own unit.
     long_name
         What it is, as an axis label would say it.
     dtype
@@ -73,6 +102,11 @@ class Variable:
     @property
     def attributes(self) -> dict[str, Any]:
         """The attributes that stand with the variable in a file."""
+        if self.units in (OF_RESPONSE, PER_RESPONSE):
+            units = RESPONSE_UNITS.values()
+            if self.units == PER_RESPONSE:
+                units = [{"m": "m-1", "m s-2": "m-1 s2"}[unit] for unit in units]
+            return {"long_name": self.long_name, "units_by_response": ", ".join(units)}
         if self.flags is None:
             return {"units": self.units, "long_name": self.long_name}
         return {
@@ -95,6 +129,10 @@ _QUANTITY = {
     "car_body_acceleration_z": ("m s-2", f"vertical acceleration {_CAR}"),
     "car_body_acceleration_y": ("m s-2", f"lateral acceleration {_CAR}"),
 }
+
+
+RESPONSE_UNITS: Mapping[str, str] = {name: _QUANTITY[name][0] for name in RESPONSES}
+"""Unit of each response in the notation of UDUNITS."""
 
 
 def _table() -> dict[str, Variable]:
@@ -299,7 +337,226 @@ def _table() -> dict[str, Variable]:
         units="m",
         long_name="largest vertical deflection at midspan measured on the line",
     )
+    return table | _study_table()
+
+
+def _number(dims: str, units: str, long_name: str, dtype: str = "float64") -> Variable:
+    """A variable on the dimensions that are named, with blanks between."""
+    return Variable(dims=tuple(dims.split()), units=units, long_name=long_name, dtype=dtype)
+
+
+def _code(dims: str, long_name: str, meanings: tuple[str, ...]) -> Variable:
+    """A code on the dimensions that are named, counted from 0."""
+    return Variable(
+        dims=tuple(dims.split()),
+        units="1",
+        long_name=long_name,
+        dtype="int8",
+        flags=dict(enumerate(meanings)),
+    )
+
+
+def _with_ends(
+    name: str, of: Variable, low: str = "low", high: str = "high"
+) -> dict[str, Variable]:
+    """A variable and the two ends of its confidence interval."""
+    table = {name: of}
+    for end, word in ((low, "lower"), (high, "upper")):
+        meaning = f"{word} end of the confidence interval of the {of.long_name}"
+        table[f"{name}_{end}"] = Variable(dims=of.dims, units=of.units, long_name=meaning)
     return table
+
+
+def _study_table() -> dict[str, Variable]:
+    """Variables of the study: point sets, runs, designs, surrogates, densities, limits."""
+    level = "response failure_probability"
+    step_level = "method step response failure_probability"
+    return {
+        # coordinates
+        "response": _code("response", "response whose extreme is meant", RESPONSES),
+        "parameter": _code("parameter", "random gain", GAINS),
+        "method": _code("method", "method by which the runs were chosen", METHODS),
+        "failure_probability": _number(
+            "failure_probability", "1", "probability that the limit is exceeded"
+        ),
+        "round": _number("round", "1", "number of the round, 0 is the first design", "int32"),
+        "step": _number("step", "1", "number of the step towards more runs", "int32"),
+        "cell": _number("cell", "1", "number of the place along the value", "int32"),
+        "check": _number("check", "1", "number of the check", "int32"),
+        # points and runs
+        "standard": _number(
+            "sample parameter", "1", "gain less its mean, over its standard deviation"
+        ),
+        "probability": _number("sample", "1", "probability that the sample stands for"),
+        "discrepancy": _number("", "1", "GF-discrepancy of the points"),
+        "counting_error": _number(
+            "", "1", "largest standard error of the probabilities by counting"
+        ),
+        "track_seed": _number(
+            "sample", "1", "seed of the irregularity that the sample meets", "int64"
+        ),
+        # designs
+        "round_index": _number("sample", "1", "round that added the sample", "int32"),
+        "predicted": _number(
+            "sample response", OF_RESPONSE, "extreme as predicted before it was run"
+        ),
+        "score": _number("sample", "1", "score by which the sample was chosen"),
+        "round_n_runs": _number("round", "1", "number of runs after the round", "int32"),
+        "error": _number(
+            "round response",
+            "1",
+            "largest absolute error of the predictions of the round, over the standard deviation "
+            "of the first design",
+        ),
+        "rmse": _number(
+            "round response",
+            OF_RESPONSE,
+            "root mean square error of the surrogate after the round against the baseline",
+        ),
+        "limit_change": _number(
+            "round",
+            "1",
+            "largest change of a limit in the round, over the standard deviation of the response",
+        ),
+        "round_limit": _number(
+            "round response failure_probability",
+            OF_RESPONSE,
+            "limit by the surrogate after the round",
+        ),
+        "decision": _code("round", "what was decided after the round", DECISIONS),
+        # surrogates
+        "kind": _code("response", "kind of the surrogate", SURROGATES),
+        "leave_one_out_error": _number(
+            "response", "1", "root mean square leave-one-out error over the standard deviation"
+        ),
+        "length": _number(
+            "response parameter", "1", "length of the surrogate in standard deviations of the gain"
+        ),
+        **_with_ends("lost_probability", _number("", "1", "probability that levitation is lost")),
+        **_with_ends("sobol_first", _number("response parameter", "1", "first-order Sobol' index")),
+        **_with_ends("sobol_total", _number("response parameter", "1", "total Sobol' index")),
+        "amplitude": _number(
+            "response", "1", "prior variance of the Kriging over the squared deviation"
+        ),
+        # predicted extremes
+        "deviation": _number(
+            "sample response", OF_RESPONSE, "standard deviation of the predicted extreme"
+        ),
+        "lost_probability_at": _number(
+            "sample", "1", "probability that levitation is lost at these gains"
+        ),
+        # densities
+        "value": _number("response cell", OF_RESPONSE, "extreme"),
+        "density": _number(
+            "response cell",
+            PER_RESPONSE,
+            "probability density of the extreme of held samples by the GDEE",
+        ),
+        "density_direct": _number(
+            "response cell",
+            PER_RESPONSE,
+            "probability density of the extreme of held samples, direct",
+        ),
+        **_with_ends(
+            "exceedance",
+            _number(
+                "response cell", "1", "probability that the extreme is exceeded or levitation lost"
+            ),
+        ),
+        "bandwidth": _number("response", OF_RESPONSE, "bandwidth of the direct density"),
+        "mesh_size": _number("response", OF_RESPONSE, "mesh size of the GDEE"),
+        "peak": _number("response", PER_RESPONSE, "largest value of the density by the GDEE"),
+        "mean": _number("response", OF_RESPONSE, "mean of the extreme of held samples"),
+        "standard_deviation": _number(
+            "response", OF_RESPONSE, "standard deviation of the extreme of held samples"
+        ),
+        "skewness": _number("response", "1", "skewness of the extreme of held samples"),
+        "n_runs": _number("", "1", "number of runs of the model behind the file", "int32"),
+        # limits
+        **_with_ends(
+            "limit",
+            _number(level, OF_RESPONSE, "limit that is exceeded with the failure probability"),
+        ),
+        "limit_status": _code(level, "what can be said of the limit", LIMIT_STATUS),
+        "sigma": _number("response", OF_RESPONSE, "standard deviation that errors are divided by"),
+        # accuracy
+        "step_n_runs": _number(
+            "method step", "1", "number of runs, 0 where there is none", "int32"
+        ),
+        "step_limit": _number(step_level, OF_RESPONSE, "limit from so many runs"),
+        "step_limit_error": _number(
+            step_level, "1", "limit less that of the baseline, over the standard deviation"
+        ),
+        "step_rmse": _number(
+            "method step response",
+            OF_RESPONSE,
+            "root mean square error of the surrogate of so many runs against the baseline",
+        ),
+        "reference_limit": _number(level, OF_RESPONSE, "limit from the baseline"),
+        "reference_half_width": _number(
+            level, "1", "half the interval of the baseline's limit, over the standard deviation"
+        ),
+        # random track
+        "density_both": _number(
+            "response cell",
+            PER_RESPONSE,
+            "probability density of the extreme, gains and track random",
+        ),
+        "density_gains_only": _number(
+            "response cell",
+            PER_RESPONSE,
+            "probability density of the extreme, gains random",
+        ),
+        "density_track_only": _number(
+            "response cell",
+            PER_RESPONSE,
+            "probability density of the extreme, track random",
+        ),
+        **_with_ends(
+            "gains_share",
+            _number("response", "1", "share of the variance that the gains alone contribute"),
+        ),
+        **_with_ends(
+            "track_share",
+            _number("response", "1", "share of the variance that the track alone contributes"),
+        ),
+        **_with_ends(
+            "interaction_share",
+            _number("response", "1", "share of the variance that gains and track have together"),
+        ),
+        # tables and checks
+        **_with_ends(
+            "table_limit",
+            _number(
+                "method response failure_probability",
+                OF_RESPONSE,
+                "limit that is exceeded with the failure probability",
+            ),
+        ),
+        "table_limit_status": _code(
+            "method response failure_probability", "what can be said of the limit", LIMIT_STATUS
+        ),
+        "table_n_runs": _number("method", "1", "number of runs of the model", "int32"),
+        "check_kind": _code(
+            "check",
+            "what is checked",
+            ("halves_agree", "limit_against_baseline", "lost_probability_against_baseline"),
+        ),
+        "check_method": _code("check", "method that is checked", METHODS),
+        "check_response": _code("check", "response that is checked", (*RESPONSES, "none")),
+        "check_failure_probability": _number(
+            "check", "1", "failure probability of the limit, 0 where none is meant"
+        ),
+        "check_value": _number(
+            "check",
+            "1",
+            "what is checked: a difference of limits over half the interval of the baseline's, "
+            "or a probability",
+        ),
+        "check_low": _number("check", "1", "least value that passes"),
+        "check_high": _number("check", "1", "largest value that passes"),
+        "check_passed": _code("check", "whether the check passed", ("no", "yes", "not_decidable")),
+    }
 
 
 VARIABLES: Mapping[str, Variable] = _table()
@@ -339,6 +596,23 @@ _HISTORIES = (
     "magnet_side",
     "magnet_x",
 )
+_RUNS = (*_EXTREMES, "standard", "probability")
+_ROUNDS = (
+    "predicted",
+    "score",
+    "round_n_runs",
+    "error",
+    "rmse",
+    "round_limit",
+    "limit_change",
+    "decision",
+)
+
+
+def _ends(*names: str) -> tuple[str, ...]:
+    """Variables with the two ends of their intervals."""
+    return tuple(f"{name}{end}" for name in names for end in ("", "_low", "_high"))
+
 
 LAYOUTS: Mapping[str, Layout] = {
     "passage": Layout(
@@ -388,8 +662,107 @@ LAYOUTS: Mapping[str, Layout] = {
             "measured_deflection",
         ),
     ),
+    "points": Layout(
+        title="Points of the random gains",
+        variables=(*GAINS, "standard", "probability", "discrepancy", "counting_error"),
+    ),
+    "runs": Layout(
+        title="Extremes of the runs of a case",
+        variables=_RUNS,
+        optional=("track_seed",),
+    ),
+    "design": Layout(
+        title="Runs of a design, by the round that added them",
+        variables=(*_RUNS, "round_index", *_ROUNDS),
+    ),
+    "round": Layout(
+        title="What one round of a design added and decided",
+        variables=(*_RUNS, *_ROUNDS),
+    ),
+    "surrogate": Layout(
+        title="Surrogate of a design: its kinds, errors and Sobol' indices",
+        variables=(
+            "kind",
+            "leave_one_out_error",
+            "length",
+            "amplitude",
+            *_ends("lost_probability", "sobol_first", "sobol_total"),
+        ),
+    ),
+    "eev": Layout(
+        title="Predicted extremes at the representative points",
+        variables=(
+            *GAINS,
+            "standard",
+            "probability",
+            "predicted",
+            "deviation",
+            "lost_probability_at",
+        ),
+    ),
+    "density": Layout(
+        title="Probability density and exceedance of the extremes",
+        variables=(
+            "value",
+            "density",
+            "density_direct",
+            *_ends("exceedance"),
+            "bandwidth",
+            "mesh_size",
+            "peak",
+            "mean",
+            "standard_deviation",
+            "skewness",
+            "lost_probability",
+            "n_runs",
+        ),
+    ),
+    "limits": Layout(
+        title="Limits of the extremes at given failure probabilities",
+        variables=(*_ends("limit", "lost_probability"), "limit_status", "n_runs", "sigma"),
+    ),
+    "accuracy": Layout(
+        title="Accuracy of limits against number of runs",
+        variables=(
+            "step_n_runs",
+            "step_limit",
+            "step_limit_error",
+            "step_rmse",
+            "reference_limit",
+            "reference_half_width",
+            "sigma",
+        ),
+    ),
+    "track_split": Layout(
+        title="What random gains and a random track contribute to the extremes",
+        variables=(
+            "value",
+            "density_both",
+            "density_gains_only",
+            "density_track_only",
+            *_ends("gains_share", "track_share", "interaction_share"),
+            "n_runs",
+        ),
+    ),
+    "table1": Layout(
+        title="Limits of the extremes by each method",
+        variables=(*_ends("table_limit"), "table_limit_status", "table_n_runs"),
+    ),
+    "statistics_check": Layout(
+        title="Whether the statistics mean something",
+        variables=(
+            "check_kind",
+            "check_method",
+            "check_response",
+            "check_failure_probability",
+            "check_value",
+            "check_low",
+            "check_high",
+            "check_passed",
+        ),
+    ),
 }
-"""What each kind of file holds, by the name of the stage that writes it."""
+"""What each kind of file holds, by its name."""
 
 
 def describe(dataset: xr.Dataset) -> xr.Dataset:
@@ -443,7 +816,7 @@ def check(dataset: xr.Dataset, layout: str) -> None:
             raise ValueError(
                 f"{layout}: '{name}' must stand on {expected.dims}, got {tuple(found.dims)}"
             )
-        if expected.flags is None and found.attrs.get("units") != expected.units:
+        if "units" in expected.attributes and found.attrs.get("units") != expected.units:
             raise ValueError(
                 f"{layout}: '{name}' must be in '{expected.units}', "
                 f"got '{found.attrs.get('units')}'"

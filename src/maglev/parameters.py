@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 import re
 import tokenize
+from collections.abc import Mapping
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Literal
 
 import pint
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
 
@@ -166,6 +168,8 @@ class Parameters(BaseModel):
                 out[name] = value.quantities()
             elif isinstance(value, tuple) and value and isinstance(value[0], Parameters):
                 out[name] = [item.quantities() for item in value]
+            elif isinstance(value, Mapping):
+                out[name] = {key: item.quantities() for key, item in value.items()}
             elif isinstance(extra, dict) and extra.get("unit") and value is not None:
                 out[name] = f"{value!r} {extra['unit']}"
             elif isinstance(value, tuple):
@@ -826,6 +830,222 @@ class Validation(Parameters):
         return self
 
 
+Response = Literal[
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+    "car_body_acceleration_z",
+    "car_body_acceleration_y",
+]
+"""A response whose extreme a passage is judged by."""
+
+Gain = Literal[
+    "suspension_proportional",
+    "suspension_derivative",
+    "guidance_proportional",
+    "guidance_derivative",
+]
+"""A gain, named as in the section ``gains``."""
+
+Method = Literal["mcm", "osm", "asm_paper", "asm"]
+"""How the runs of a case are chosen: plain Monte Carlo, one-stage set, adaptive as published,
+adaptive towards the limits."""
+
+SurrogateKind = Literal["rbf", "scaled_rbf", "kriging", "best"]
+"""A surrogate; ``best``: for each response the one with the least leave-one-out error."""
+
+_GAINS: tuple[Gain, ...] = (
+    "suspension_proportional",
+    "suspension_derivative",
+    "guidance_proportional",
+    "guidance_derivative",
+)
+
+
+def _count(default: int, meaning: str, *, minimum: int = 1) -> Any:
+    """Describe a whole number that is a choice, not a measurement."""
+    return Field(default, description=meaning, ge=minimum)
+
+
+class MonteCarlo(Parameters):
+    """The baseline: independent random gains, one run each."""
+
+    n_samples: int = _count(10_000, "number of runs, unless the case says another", minimum=2)
+    chunk_size: int = _count(500, "runs in one file and job; no number depends on it")
+
+
+class OneStage(Parameters):
+    """One-stage sampling (OSM): all runs on one GF point set."""
+
+    n_runs: int = _count(363, "number of runs", minimum=8)
+    surrogate: SurrogateKind = Field("rbf", description="surrogate of the runs")
+
+
+class PaperDesign(Parameters):
+    """Adaptive sampling as published (ASM): RBF, Taylor expansion, one response drives."""
+
+    n_initial: int = _count(50, "runs of the first design, at most", minimum=8)
+    initial_per_gain: int = _count(
+        12, "runs of the first design for each random gain, at most", minimum=8
+    )
+    n_candidates: int = _count(1000, "GF points that rounds choose from", minimum=8)
+    batch_size: int = _count(4, "runs of one round")
+    response: Response = Field("girder_displacement_z", description="response that drives")
+    threshold: float = Field(
+        0.02,
+        description="error of a round that counts as small, in standard deviations of the response",
+        gt=0,
+    )
+    n_rounds: int = _count(5, "rounds in a row whose error must be small to stop")
+    n_largest: int = _count(363, "largest number of runs", minimum=8)
+    surrogate: SurrogateKind = Field("rbf", description="surrogate of the runs")
+
+
+class TailDesign(Parameters):
+    """Adaptive sampling towards the limits of all responses, on one set of runs."""
+
+    n_initial: int = _count(40, "runs of the first design, at most", minimum=8)
+    initial_per_gain: int = _count(
+        12, "runs of the first design for each random gain, at most", minimum=8
+    )
+    n_candidates: int = _count(16_384, "Sobol' points that rounds choose from", minimum=8)
+    batch_size: int = _count(8, "runs of one round")
+    aggregate: Literal["sum", "maximum"] = Field(
+        "sum", description="how the gains of several limits become one score"
+    )
+    threshold: float = Field(
+        0.02,
+        description="largest change of a limit in a round, in standard deviations of the response, "
+        "that counts as settled",
+        gt=0,
+    )
+    n_rounds: int = _count(3, "rounds in a row in which the limits must be settled to stop")
+    n_largest: int = _count(104, "largest number of runs", minimum=8)
+    surrogate: SurrogateKind = Field("best", description="surrogate of the finished design")
+
+
+class Study(Parameters):
+    """How densities and limits are found, for all cases."""
+
+    failure_probability: tuple[float, ...] = Field(
+        (0.1, 0.01, 0.001),
+        description="probabilities of exceedance whose limits are given, from large to small",
+        min_length=1,
+    )
+    confidence: float = Field(
+        0.95, description="probability that an interval covers the truth", gt=0, lt=1
+    )
+    n_representative: int = _count(1000, "GF points that a density stands on", minimum=8)
+    n_population: int = _count(131_072, "Sobol' points at which limits are read off", minimum=8)
+    n_counting: int = _count(
+        1_048_576, "Sobol' points that count Voronoi cells, a power of two", minimum=8
+    )
+    mcm: MonteCarlo = MonteCarlo()
+    osm: OneStage = OneStage()
+    asm_paper: PaperDesign = PaperDesign()
+    asm: TailDesign = TailDesign()
+
+    @model_validator(mode="after")
+    def _check(self) -> Study:
+        levels = self.failure_probability
+        if not all(0 < level < 1 for level in levels):
+            raise ValueError(f"failure_probability must lie between 0 and 1, got {list(levels)}")
+        if any(high <= low for high, low in pairwise(levels)):
+            raise ValueError(
+                f"failure_probability must fall from value to value, got {list(levels)}"
+            )
+        if self.n_counting & (self.n_counting - 1):
+            raise ValueError(f"n_counting must be a power of two, got {self.n_counting}")
+        for name, n in (
+            ("n_representative", self.n_representative),
+            ("osm.n_runs", self.osm.n_runs),
+            ("asm_paper.n_candidates", self.asm_paper.n_candidates),
+        ):
+            if n > self.n_counting:
+                raise ValueError(f"{name} must not exceed n_counting = {self.n_counting}, got {n}")
+        for name, design in (("asm_paper", self.asm_paper), ("asm", self.asm)):
+            if design.n_candidates < design.n_largest:
+                raise ValueError(
+                    f"{name}.n_candidates must be at least {name}.n_largest = {design.n_largest}, "
+                    f"got {design.n_candidates}: rounds cannot choose more runs than there are "
+                    "candidates"
+                )
+            if design.n_largest < design.n_initial:
+                raise ValueError(
+                    f"{name}.n_largest must be at least {name}.n_initial = {design.n_initial}, "
+                    f"got {design.n_largest}"
+                )
+        return self
+
+
+_RESERVED = ("config", "track", "guideway", "figures", "tables", "checks", "report")
+"""Folders beside those of the cases."""
+
+
+class Case(Parameters):
+    """Which gains are random, how much, on how many spans, and by which methods."""
+
+    n_spans: int = _count(5, "number of spans, in place of guideway.n_spans")
+    coefficient_of_variation: float = Field(
+        0.10,
+        description="standard deviation of each random gain over its mean; normal, independent",
+        gt=0,
+        allow_inf_nan=False,
+    )
+    random_gains: tuple[Gain, ...] = Field(
+        _GAINS, description="gains that are random; the others stay at their means", min_length=1
+    )
+    methods: tuple[Method, ...] = Field(
+        ("asm",), description="methods that the target `all` runs", min_length=1
+    )
+    n_samples: int | None = Field(
+        None, description="runs of its baseline; null: study.mcm.n_samples", ge=2
+    )
+    random_track: bool = Field(
+        False, description="whether each sample has an irregularity of its own (mcm only)"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_correlation(cls, data: Any) -> Any:
+        for key in data if isinstance(data, Mapping) else ():
+            if "correlat" in str(key):
+                raise ValueError(
+                    f"{key} is not supported: the random gains are independent; leave it out"
+                )
+        return data
+
+    @model_validator(mode="after")
+    def _check(self) -> Case:
+        for key, names in (("random_gains", self.random_gains), ("methods", self.methods)):
+            if len(set(names)) < len(names):
+                raise ValueError(f"{key} must not name anything twice, got {', '.join(names)}")
+        if self.random_track and self.methods != ("mcm",):
+            others = ", ".join(name for name in self.methods if name != "mcm")
+            raise ValueError(
+                f"random_track works with the method mcm only, got {others}: a surrogate of the "
+                "gains cannot know the track of each sample"
+            )
+        return self
+
+
+def _cases() -> dict[str, Case]:
+    """The cases of the paper."""
+    cases = {"validation": Case(methods=("mcm", "osm", "asm_paper", "asm"))}
+    for gain in _GAINS:
+        cases[f"only_{gain}"] = Case(n_spans=20, random_gains=(gain,))
+    cases["all_gains"] = Case(n_spans=20)
+    for percent in range(4, 16, 2):
+        cases[f"cov_{percent:03d}"] = Case(coefficient_of_variation=percent / 100)
+    return cases
+
+
+def _normal_cdf(u: float) -> float:
+    """Standard normal distribution function."""
+    return 0.5 * math.erfc(-u / math.sqrt(2.0))
+
+
 class Config(Parameters):
     """Everything a run is made of."""
 
@@ -844,6 +1064,96 @@ class Config(Parameters):
     gains: Gains = Gains()
     passage: Passage = Passage()
     validation: Validation = Validation()
+    study: Study = Study()
+    cases: Mapping[str, Case] = Field(
+        _cases(),
+        description="the cases by name; null removes a case that a file below names",
+        json_schema_extra={"names": r"^[a-z][a-z0-9_]*$"},
+    )
+
+    def __hash__(self) -> int:
+        return hash(
+            tuple(
+                frozenset(value.items()) if isinstance(value, Mapping) else value
+                for value in self.__dict__.values()
+            )
+        )
+
+    def quantities(self) -> dict[str, Any]:
+        """Return the class as the configuration file would write it, units included."""
+        whole = super().quantities()
+        removed: dict[str, Any] = {name: None for name in _cases() if name not in self.cases}
+        return {**whole, "cases": {**whole["cases"], **removed}}
+
+    @field_validator("cases", mode="before")
+    @classmethod
+    def _drop_removed(cls, cases: Any) -> Any:
+        if not isinstance(cases, Mapping):
+            return cases
+        for name in cases:
+            if not re.fullmatch(r"[a-z][a-z0-9_]*", str(name)) or name in _RESERVED:
+                raise ValueError(
+                    f"'{name}' cannot name a case: use small letters, digits and underscores, and "
+                    f"none of {', '.join(_RESERVED)}"
+                )
+        return {name: case for name, case in cases.items() if case is not None}
+
+    def of_case(self, name: str) -> Config:
+        """Return the configuration with the guideway of a case.
+
+        Raises
+        ------
+        ValueError
+            If there is no such case.
+        """
+        if name not in self.cases:
+            raise ValueError(f"there is no case '{name}', known are: {', '.join(self.cases)}")
+        n_spans = self.cases[name].n_spans
+        guideway = self.guideway.model_copy(update={"n_spans": n_spans})
+        return self.model_copy(update={"guideway": guideway})
+
+    def statically_stable(self, case: Case) -> float:
+        """Probability that the gains of a case can hold the train statically [-].
+
+        A magnet pulls more the closer it is, so its k_p must exceed i₀/δ₀ and its k_d must not be
+        negative.
+
+        References
+        ----------
+        docs/theory/train.md, the linearised magnet.
+        """
+        probability = 1.0
+        for kind in ("suspension", "guidance"):
+            magnet = getattr(self.train, f"{kind}_magnet")
+            for gain, least in (
+                (f"{kind}_proportional", magnet.current_reference / magnet.gap_reference),
+                (f"{kind}_derivative", 0.0),
+            ):
+                mean = getattr(self.gains, gain)
+                if gain in case.random_gains:
+                    deviation = case.coefficient_of_variation * mean
+                    probability *= _normal_cdf((mean - least) / deviation)
+                elif mean < least:
+                    return 0.0
+        return probability
+
+    @model_validator(mode="after")
+    def _check_cases(self) -> Config:
+        for name, case in self.cases.items():
+            for gain in case.random_gains:
+                if not getattr(self.gains, gain) > 0:
+                    raise ValueError(
+                        f"cases.{name}.random_gains: {gain} cannot be random, its mean is zero"
+                    )
+            stable = self.statically_stable(case)
+            if stable < 0.5:
+                raise ValueError(
+                    f"cases.{name}.coefficient_of_variation = {case.coefficient_of_variation:g} "
+                    f"leaves only {100 * stable:.0f} % of the gains statically stable "
+                    "(k_p > i0/delta0, k_d >= 0), expected at least half; lower it or raise the "
+                    "mean gains"
+                )
+        return self
 
     @model_validator(mode="after")
     def _check(self) -> Config:
