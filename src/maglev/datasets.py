@@ -63,6 +63,13 @@ DECISIONS = (
 LIMIT_STATUS = ("given", "too_few_exceedances", "infinite")
 """What can be said of a limit."""
 
+DENSITY_METHODS = ("gdee", "gdee_of_the_logarithm", "direct")
+"""How a density was found: by the GDEE; by the GDEE of the logarithm of the extreme, where strays
+ask for too fine a mesh; directly, where there is no GDEE or it refused both."""
+
+SOURCES = ("paper", "ours")
+"""Whose number stands there."""
+
 TRACK_PARTS = ("gains_only", "track_only", "other_track", "other_gains")
 """Further runs of a case whose baseline has gains i on track i: gains i on the configured track;
 mean gains on track i; gains i on track n + i; gains n + i on track i (n samples)."""
@@ -465,7 +472,11 @@ def _study_table() -> dict[str, Variable]:
         ),
         "bandwidth": _number("response", OF_RESPONSE, "bandwidth of the direct density"),
         "mesh_size": _number("response", OF_RESPONSE, "mesh size of the GDEE"),
-        "peak": _number("response", PER_RESPONSE, "largest value of the density by the GDEE"),
+        "density_method": _code("response", "how the density was found", DENSITY_METHODS),
+        "peak": _number(
+            "response", PER_RESPONSE, "largest value of the density by the GDEE on its own mesh"
+        ),
+        "peak_direct": _number("response", PER_RESPONSE, "largest value of the direct density"),
         "mean": _number("response", OF_RESPONSE, "mean of the extreme of held samples"),
         "standard_deviation": _number(
             "response", OF_RESPONSE, "standard deviation of the extreme of held samples"
@@ -536,12 +547,34 @@ def _study_table() -> dict[str, Variable]:
         "table_limit_status": _code(
             "method response failure_probability", "what can be said of the limit", LIMIT_STATUS
         ),
+        **_with_ends(
+            "table_lost_probability",
+            _number("method", "1", "probability that levitation is lost"),
+        ),
         "table_n_runs": _number("method", "1", "number of runs of the model", "int32"),
+        "source": _code("source", "whose number stands there", SOURCES),
+        "paper_peak": _number(
+            "source method", "m-1", "largest density of the girder's vertical displacement"
+        ),
+        "paper_peak_error": _number(
+            "source method", "1", "largest density less that of the baseline, over the latter"
+        ),
+        "paper_rmse": _number(
+            "source method",
+            "m",
+            "root mean square error of the girder's vertical displacement against the baseline",
+        ),
+        "paper_rmse_n_runs": _number("source method", "1", "number of runs behind it", "int32"),
+        "paper_n_runs": _number("source method", "1", "number of runs of the method", "int32"),
+        "paper_deviation": _number(
+            "source method", "m", "standard deviation of the girder's vertical displacement"
+        ),
         "check_kind": _code(
             "check",
             "what is checked",
             ("halves_agree", "limit_against_baseline", "lost_probability_against_baseline"),
         ),
+        "check_case": _number("check", "1", "case that is checked, see flag_meanings", "int32"),
         "check_method": _code("check", "method that is checked", METHODS),
         "check_response": _code("check", "response that is checked", (*RESPONSES, "none")),
         "check_failure_probability": _number(
@@ -709,7 +742,9 @@ LAYOUTS: Mapping[str, Layout] = {
             *_ends("exceedance"),
             "bandwidth",
             "mesh_size",
+            "density_method",
             "peak",
+            "peak_direct",
             "mean",
             "standard_deviation",
             "skewness",
@@ -746,12 +781,28 @@ LAYOUTS: Mapping[str, Layout] = {
     ),
     "table1": Layout(
         title="Limits of the extremes by each method",
-        variables=(*_ends("table_limit"), "table_limit_status", "table_n_runs"),
+        variables=(
+            *_ends("table_limit", "table_lost_probability"),
+            "table_limit_status",
+            "table_n_runs",
+        ),
+    ),
+    "paper_and_ours": Layout(
+        title="What survives of the paper's numbers, and ours",
+        variables=(
+            "paper_peak",
+            "paper_peak_error",
+            "paper_rmse",
+            "paper_rmse_n_runs",
+            "paper_n_runs",
+            "paper_deviation",
+        ),
     ),
     "statistics_check": Layout(
         title="Whether the statistics mean something",
         variables=(
             "check_kind",
+            "check_case",
             "check_method",
             "check_response",
             "check_failure_probability",
