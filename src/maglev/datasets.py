@@ -651,7 +651,7 @@ LAYOUTS: Mapping[str, Layout] = {
     "passage": Layout(
         title="Passage of the train over the guideway",
         variables=_EXTREMES,
-        optional=_HISTORIES,
+        optional=(*_HISTORIES, "track_seed"),
     ),
     "irregularity": Layout(
         title="Track irregularity and its spectra",

@@ -127,6 +127,7 @@ def taylor_batch(
     *,
     aggregate: str = "sum",
     held_probability: npt.ArrayLike | None = None,
+    scores: Array | None = None,
 ) -> npt.NDArray[np.int64]:
     """Candidates of the largest score J, one after another.
 
@@ -147,6 +148,8 @@ def taylor_batch(
         ``"sum"`` or ``"maximum"`` over the responses.
     held_probability : (candidate,)
         Probability that a candidate is not lost, which multiplies its score; 1 if not given.
+    scores : (n_new,), optional
+        Receives the score of each candidate at the time it was chosen [-].
 
     Returns
     -------
@@ -173,6 +176,8 @@ def taylor_batch(
         score = held * taylor_scores(distance, remainder, domain, aggregate)
         score[distance == 0.0] = -np.inf
         best = chosen[place] = np.argmax(score)
+        if scores is not None:
+            scores[place] = score[best]
         remainder[best] = 0.0
         distance = np.minimum(distance, np.linalg.norm(candidates - candidates[best], axis=1))
     return chosen
@@ -229,6 +234,7 @@ def tail_batch(
     aggregate: str = "sum",
     exceedances: Sequence[float] = EXCEEDANCES,
     held_probability: npt.ArrayLike | None = None,
+    scores: Array | None = None,
 ) -> npt.NDArray[np.int64]:
     """Candidates that most reduce the variance of the surrogate where the limits are decided.
 
@@ -255,6 +261,8 @@ def tail_batch(
         Probabilities of exceedance whose limits are wanted [-].
     held_probability : (candidate,)
         Probability that a candidate is not lost; weights nodes and gains; 1 if not given.
+    scores : (n_new,), optional
+        Receives the gain of each candidate at the time it was chosen [-].
 
     Returns
     -------
@@ -320,6 +328,8 @@ def tail_batch(
         best = int(np.argmax(gain))
         free[best] = False
         chosen[place] = pool[best]
+        if scores is not None:
+            scores[place] = gain[best]
         for response, spread in enumerate(scale):
             if variance[response, best] <= SETTLED * spread**2:
                 continue
