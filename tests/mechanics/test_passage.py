@@ -148,12 +148,10 @@ def test_displacements_and_car_bodies_are_those_of_the_reference_solver(speed, t
 
 
 @pytest.mark.parametrize(("speed", "track"), STORED)
-@pytest.mark.parametrize("fine", [True, False])
-def test_girder_accelerations_are_those_of_the_reference_solver(speed, track, fine):
-    """Within half a per cent once both are fine, but for 0.7 % of the 0.12 m/s² that smooth track
-    leaves at 200 km/h; within one per cent as they are by default."""
+@pytest.mark.parametrize(("fine", "tolerance"), [(True, 5e-3), (False, 1e-2)])
+def test_girder_accelerations_are_those_of_the_reference_solver(speed, track, fine, tolerance):
+    """Within half a per cent once both are fine, within one per cent as they are by default."""
     found, stored = against_stored(speed, track, fine)
-    tolerance = 1e-2 if not fine or (speed, track) == (200, "smooth") else 5e-3
     assert_allclose(found.girder[:, 2], stored["girder"][:, 2], rtol=tolerance)
     if track == "irregular":
         assert_allclose(found.girder[:, 3], stored["girder"][:, 3], rtol=tolerance)
@@ -166,8 +164,8 @@ def test_gaps_and_currents_are_those_of_the_reference_solver(speed, track):
         assert_allclose(getattr(found, name), stored[name], rtol=5e-3, err_msg=name)
     suspension, guidance = found.current_max.T
     assert_allclose(suspension, stored["current_max"][:, 0], rtol=5e-3)
-    # Rails that a train spreads apart in mirror image, by a few micrometres, stay in production.
-    assert_allclose(guidance, stored["current_max"][:, 1], rtol=1e-2)
+    # On smooth track it is decided at the joints, where single poles feel modes beyond the cut-off.
+    assert_allclose(guidance, stored["current_max"][:, 1], rtol=6e-3)
 
 
 @pytest.mark.parametrize("speed", [430, 200])

@@ -142,6 +142,28 @@ class GuidewayModel:
             raise ValueError(f"side must be {RIGHT} (right) or {LEFT} (left), got {side}")
         return _line_rows(self.rail_lines[0 if side == RIGHT else 1], x, self.n_dof)
 
+    def rail_section_rows(
+        self, x: npt.ArrayLike, side: int
+    ) -> tuple[sparse.csr_array, sparse.csr_array]:
+        """Rows that read how far a rail's section has turned, shear left out.
+
+        Parameters
+        ----------
+        x, side
+            As in `rail_rows`.
+
+        Returns
+        -------
+        turn_z, turn_y : csr (point, dof)
+            Slope of the section in the vertical and in the lateral plane, positive where it lifts
+            the slope of the axis [rad].
+        """
+        line = self.rail_lines[0 if side == RIGHT else 1]
+        return (
+            _plane_rows(line, line.vertical, timoshenko.rotation_shape, x, self.n_dof),
+            _plane_rows(line, line.lateral, timoshenko.rotation_shape, x, self.n_dof),
+        )
+
     def girder_rows(self, x: npt.ArrayLike) -> tuple[sparse.csr_array, sparse.csr_array]:
         """Rows that read the motion of the girder axis.
 
@@ -652,23 +674,27 @@ def _line_rows(
     line: BeamLine, x: npt.ArrayLike, n_dof: int
 ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, sparse.csr_array]:
     """Rows of u_z, du_z/dx, u_y, du_y/dx at places on a line; zero beyond its ends."""
+    return (
+        _plane_rows(line, line.vertical, timoshenko.deflection_shape, x, n_dof),
+        _plane_rows(line, line.vertical, timoshenko.slope_shape, x, n_dof),
+        _plane_rows(line, line.lateral, timoshenko.deflection_shape, x, n_dof),
+        _plane_rows(line, line.lateral, timoshenko.slope_shape, x, n_dof),
+    )
+
+
+def _plane_rows(
+    line: BeamLine,
+    plane: BeamPlane,
+    of_nodes: Callable[..., FloatArray],
+    x: npt.ArrayLike,
+    n_dof: int,
+) -> sparse.csr_array:
+    """Rows of one motion in one plane at places on a line; zero beyond its ends."""
     x = np.atleast_1d(np.asarray(x, dtype=float))
     on = (x >= 0) & (x <= line.start[-1] + line.length[-1])
     e = np.clip(np.searchsorted(line.start, x, side="right") - 1, 0, None)
-    at, L = np.where(on, x - line.start[e], 0.0), line.length[e]
-
-    def rows(plane: BeamPlane, of_nodes: Callable[..., FloatArray]) -> sparse.csr_array:
-        shape = of_nodes(L, plane.phi[e], at) * on[:, np.newaxis]
-        entry = shape[:, :, np.newaxis] * plane.share[e]
-        width = entry.shape[1] * entry.shape[2]
-        pointer = width * np.arange(x.size + 1)
-        return sparse.csr_array(
-            (entry.ravel(), plane.dof[e].ravel(), pointer), shape=(x.size, n_dof)
-        )
-
-    return (
-        rows(line.vertical, timoshenko.deflection_shape),
-        rows(line.vertical, timoshenko.slope_shape),
-        rows(line.lateral, timoshenko.deflection_shape),
-        rows(line.lateral, timoshenko.slope_shape),
-    )
+    at = np.where(on, x - line.start[e], 0.0)
+    shape = of_nodes(line.length[e], plane.phi[e], at) * on[:, np.newaxis]
+    entry = shape[:, :, np.newaxis] * plane.share[e]
+    pointer = entry.shape[1] * entry.shape[2] * np.arange(x.size + 1)
+    return sparse.csr_array((entry.ravel(), plane.dof[e].ravel(), pointer), shape=(x.size, n_dof))

@@ -30,10 +30,9 @@ from maglev.mechanics.irregularity import Profile, displacement
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import (
     ReducedGuideway,
-    hermite_slopes,
-    hermite_weights,
-    rail_nodes,
+    rail_weights,
     reduce,
+    standing_sag,
 )
 from maglev.mechanics.responses import Passages, acceleration_filter, checked_gains
 from maglev.parameters import Config, Guideway, Magnet
@@ -87,8 +86,9 @@ def prepare(config: Config, profile: Profile) -> System:
         If the time step exceeds the stability limit or the profile is shorter than the run.
     """
     train = train_model.build(config.train)
+    guideway = guideway_model.build(config.guideway)
     reduced = reduce(
-        guideway_model.build(config.guideway),
+        guideway,
         config.passage.mode_cutoff,
         config.passage.mode_cutoff_elsewhere,
     )
@@ -113,8 +113,8 @@ def prepare(config: Config, profile: Profile) -> System:
         vehicle=_vehicle(train),
         suspension=suspension,
         guidance=guidance,
-        suspension_places=_places(config, suspension, profile),
-        guidance_places=_places(config, guidance, profile),
+        suspension_places=_places(config, suspension, profile, guideway, reduced),
+        guidance_places=_places(config, guidance, profile, guideway, reduced),
         line=_line(reduced, time_step(config)),
         config=config,
     )
@@ -350,41 +350,65 @@ def _stride(guideway: Guideway) -> int:
     return -(-rail.units_per_span * 2 * (rail.connectors_per_unit + 2) // 4) * 4
 
 
-def _places(config: Config, rows: MagnetRows, profile: Profile) -> Places:
+def _places(
+    config: Config,
+    rows: MagnetRows,
+    profile: Profile,
+    guideway: guideway_model.GuidewayModel,
+    reduced: ReducedGuideway,
+) -> Places:
     """Tabulate rail pieces and irregularity where the poles are after whole numbers of steps."""
     advance = config.passage.speed * time_step(config)
     start = (rows.x[:, None] + rows.offset - config.passage.approach) / advance
     whole = np.floor(start + 1e-6)
     beyond = np.round(start - whole, 6)  # share of a step; places with the same one form a series
     series = np.unique(beyond)
-    first = int(whole.min())
-    count = int(whole.max()) - first + n_steps(config) + 1
-    number = (whole - first).astype(np.int64) + count * np.searchsorted(series, beyond)
-    x = ((first + np.arange(count) + series[:, None]) * advance).ravel()
+    earliest = int(whole.min())
+    count = int(whole.max()) - earliest + n_steps(config) + 1
+    number = (whole - earliest).astype(np.int64) + count * np.searchsorted(series, beyond)
+    x = ((earliest + np.arange(count) + series[:, None]) * advance).ravel()
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
-    n_units = config.guideway.rail.units_per_span
-    unit = np.floor(x / length * n_units + 1e-9).astype(np.int64)
-    on = (unit >= 0) & (unit < n_units * n_spans)
-    n_connectors = config.guideway.rail.connectors_per_unit
-    local = np.clip((x / length * n_units - unit) * n_connectors, 0.0, n_connectors)
-    nodes = rail_nodes(n_connectors)
-    piece = np.clip(np.searchsorted(nodes, local, side="right") - 1, 0, nodes.size - 2)
-    extent = np.diff(nodes)[piece]  # of the piece, in connector spacings
-    u = (local - nodes[piece]) / extent
-    base = (unit // n_units) * _stride(config.guideway)
-    base += (unit % n_units) * 2 * nodes.size + 2 * piece
-    slopes_per_spacing = np.stack([np.ones_like(u), extent, np.ones_like(u), extent], axis=-1)
-    rate = config.passage.speed * n_units * n_connectors / (length * extent[:, None])
-    value, slope = displacement(profile, x)
+    on = (x >= -1e-9) & (x < length * n_spans - 1e-9)
+    span = np.clip(np.floor(x / length + 1e-9), 0, n_spans - 1).astype(np.int64)
+    first_coefficient, weight, slope = rail_weights(
+        config.guideway, x - span * length, lateral=rows.is_guidance
+    )
+    value, ramp = displacement(profile, x)
     kind = slice(2, 4) if rows.is_guidance else slice(0, 2)
+    sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x)
+    apart = np.array([1.0, -1.0 if rows.is_guidance else 1.0])
+    speed = config.passage.speed
     return Places(
         number=number,
-        base=np.where(on, base, -1),
-        weight=np.where(on[:, None], hermite_weights(u) * slopes_per_spacing, 0.0),
-        rise=np.where(on[:, None], hermite_slopes(u) * slopes_per_spacing * rate, 0.0),
-        rail=np.ascontiguousarray(value[kind].T),
-        ramp=np.ascontiguousarray(slope[kind].T) * config.passage.speed,
+        base=np.where(on, span * _stride(config.guideway) + first_coefficient, -1),
+        weight=np.where(on[:, None], weight, 0.0),
+        rise=np.where(on[:, None], slope * speed, 0.0),
+        rail=np.ascontiguousarray(value[kind].T) + sag[:, None] * apart,
+        ramp=(np.ascontiguousarray(ramp[kind].T) + sag_slope[:, None] * apart) * speed,
     )
+
+
+def _standing_sag(
+    config: Config,
+    rows: MagnetRows,
+    guideway: guideway_model.GuidewayModel,
+    reduced: ReducedGuideway,
+    x: Array,
+) -> tuple[Array, Array]:
+    """Sag of the rails under poles at ``x`` beyond that of the modes, and its slope along x."""
+    length, n_spans = config.guideway.span_length, config.guideway.n_spans
+    magnet = config.train.guidance_magnet if rows.is_guidance else config.train.suspension_magnet
+    force = float(rows.constant.mean()) * (rows.current_reference / rows.gap_reference) ** 2
+    sag, slope = np.zeros_like(x), np.zeros_like(x)
+    for span in range(n_spans):
+        inside = np.flatnonzero((x >= span * length) & (x < (span + 1) * length))
+        places, of_span, its_slope = standing_sag(
+            guideway, reduced, span, force, magnet.pole_pitch, lateral=rows.is_guidance
+        )
+        at = x[inside] - span * length
+        sag[inside] = np.interp(at, places, of_span)
+        slope[inside] = np.interp(at, places, its_slope)
+    return sag, slope
 
 
 def _line(reduced: ReducedGuideway, time_step: float) -> Line:

@@ -8,17 +8,23 @@ the train is.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 import scipy.sparse as sp
+import scipy.sparse.linalg
 
 from maglev.mechanics import guideway as full
+from maglev.mechanics import timoshenko
 from maglev.parameters import Guideway
 
 Array = npt.NDArray[np.float64]
+
+_SAG_POINTS = 32
+"""Places within a pole pitch at which the standing sag is tabulated [-]; assumed."""
 
 DAMPING_DROP = 1e-3
 """Entries of the damping matrix below this share of their diagonals are dropped [-]; assumed,
@@ -45,9 +51,9 @@ class ReducedGuideway:
     relative_damping : (coordinate, coordinate)
         Acts on the relative rates of the modes and the rates of the pier tops; sparse.
     rail_z, rail_roll, rail_y : span of (column, coefficient)
-        Hermite coefficients along a span of a rail's vertical motion on the centre line, of the
-        roll times the rail's distance from it, and of its lateral motion, per unit coordinate:
-        value and slope times connector spacing at the nodes of each unit, its ends and connectors.
+        Motion of the rails along a span per unit coordinate: vertical on the centre line, roll
+        times the rail's distance from it, and lateral.  Displacement, and turn of the section times
+        connector spacing, at the nodes of each unit, its ends and connectors.
     midspan_z, midspan_y : (column,)
         Motion of the middle span's girder axis at midspan per unit coordinate.
     basis : (dof, coordinate)
@@ -73,6 +79,11 @@ class ReducedGuideway:
         """Number of coordinates [-]."""
         return int(self.stiffness.shape[0])
 
+    def own_modes(self, span: int) -> npt.NDArray[np.int64]:
+        """Coordinates of a span's own modes, those of its pier tops left out (mode,)."""
+        columns = self.span_coordinates[span]
+        return columns[columns < self.n_modes]
+
     @property
     def mass(self) -> sp.csr_array:
         """Mass matrix (coordinate, coordinate)."""
@@ -96,34 +107,114 @@ class ReducedGuideway:
 def rail_nodes(n_connectors: int) -> Array:
     """Ends and connectors of a unit of rail, from its start in connector spacings (node,) [-].
 
-    Between them the rail is a beam without loads but the poles': cubic pieces from node to node
-    follow it, and none bridges the joint of two units.  Units join with a kink, and poles that pass
+    Between them the rail is a beam element, whose shapes the motion of its nodes goes through, and
+    none bridges the joint of two units.  Units join with a kink, and poles that pass
     kinks one after the other shake the guideway at the rate of pole passing.
     """
     return np.concatenate([[0.0], np.arange(n_connectors) + 0.5, [float(n_connectors)]])
 
 
-def hermite_weights(u: Array) -> Array:
-    """Weights of value and slope at the start, value and slope at the end, of a cubic piece.
+def rail_weights(
+    guideway: Guideway, x: npt.ArrayLike, *, lateral: bool
+) -> tuple[npt.NDArray[np.int64], Array, Array]:
+    """How the coefficients of a span's rails make the motion of places along it.
 
     Parameters
     ----------
-    u : (point,)
-        Place in the piece, 0 to 1 [-].
+    guideway
+        Parameters.
+    x : (point,)
+        Places along the span, from its start [m].
+    lateral
+        Whether the motion is ``rail_y``; else ``rail_z`` or ``rail_roll``.
 
     Returns
     -------
-    weights : (point, 4)
-        Slopes count per piece length [-].
+    first : (point,)
+        The first of the four neighbouring coefficients that count at a place [-].
+    weight, slope : (point, 4)
+        Of the coefficients in the motion [-] and in its derivative along travel [1/m].
     """
-    v = 1.0 - u
-    return np.stack([(1 + 2 * u) * v**2, u * v**2, u**2 * (3 - 2 * u), -(u**2) * v], axis=-1)
+    rail = guideway.rail
+    n_units, n_connectors = rail.units_per_span, rail.connectors_per_unit
+    spacing = guideway.span_length / (n_units * n_connectors)
+    along = np.asarray(x, dtype=float) / guideway.span_length * n_units
+    unit = np.clip(np.floor(along + 1e-9), 0, n_units - 1).astype(np.int64)
+    local = np.clip((along - unit) * n_connectors, 0.0, n_connectors)
+    nodes = rail_nodes(n_connectors)
+    piece = np.clip(np.searchsorted(nodes, local, side="right") - 1, 0, nodes.size - 2)
+    extent = np.diff(nodes)[piece] * spacing
+    phi = timoshenko.shear_flexibility(rail.section, extent)[1 if lateral else 0]
+    inside = (local - nodes[piece]) * spacing
+    per_coefficient = np.array([1.0, 1.0 / spacing, 1.0, 1.0 / spacing])
+    return (
+        2 * (unit * nodes.size + piece),
+        timoshenko.deflection_shape(extent, phi, inside) * per_coefficient,
+        timoshenko.slope_shape(extent, phi, inside) * per_coefficient,
+    )
 
 
-def hermite_slopes(u: Array) -> Array:
-    """Derivatives of `hermite_weights` with respect to the place in the piece (point, 4) [-]."""
-    v = 1.0 - u
-    return np.stack([-6 * u * v, v * (1 - 3 * u), 6 * u * v, u * (3 * u - 2)], axis=-1)
+def standing_sag(
+    model: full.GuidewayModel,
+    reduced: ReducedGuideway,
+    span: int,
+    force: float,
+    pitch: float,
+    *,
+    lateral: bool,
+) -> tuple[Array, Array, Array]:
+    """What a row of poles at rest bends the rails by, beyond what the modes of a span hold.
+
+    The bays between connectors follow the poles at once: their modes lie far above the cut-off.
+    The pole forces hardly vary, so that what the left-out modes add is taken once for all.
+
+    Parameters
+    ----------
+    model, reduced
+        Guideway, whole and in component coordinates.
+    span
+        Number of the span.
+    force
+        Force of one pole on its rail [N]; down, or away from the centre line.
+    pitch
+        Distance of neighbouring poles [m].
+    lateral
+        Whether the poles are those of the guidance magnets.
+
+    Returns
+    -------
+    x, sag, slope : (point,)
+        Places along the span, from its start [m], the motion of the rail at a pole there in the
+        direction of the force, with other poles all along the span [m], and its derivative along
+        travel [-].  Both jump where units meet, at two neighbouring places.
+    """
+    length, dof = model.parameters.span_length, model.span_dof[span]
+    n_units, n_poles = model.parameters.rail.units_per_span, round(length / pitch)
+    n_points = math.lcm(n_units, n_poles)
+    n_points *= -(-_SAG_POINTS * n_poles // n_points)
+    n_phases = n_points // n_poles
+    x = (np.arange(n_points) + 0.5) * length / n_points
+    kind = 2 if lateral else 0
+    right, left = (model.rail_rows(span * length + x, side)[kind][:, dof] for side in (1, -1))
+    outward = (right - left if lateral else right + left).tocsr()
+    load = np.stack([outward[k::n_phases].sum(axis=0) for k in range(n_phases)], axis=1) * force
+    own = reduced.own_modes(span)
+    shapes = reduced.basis[dof][:, own].toarray()
+    square = reduced.stiffness.diagonal()[own]
+    beyond = scipy.sparse.linalg.splu(model.stiffness[dof][:, dof].tocsc()).solve(load)
+    beyond -= shapes @ ((shapes.T @ load) / square[:, None])
+    both = outward @ beyond / 2
+    sag = both[np.arange(n_points), np.arange(n_points) % n_phases].reshape(n_units, -1)
+    slope, half = np.gradient(sag, length / n_points, axis=1), length / n_points / 2
+    ends = np.arange(n_units)[:, None] * length / n_units + [0.0, length / n_units - 1e-9]
+    return tuple(
+        np.column_stack([first, inner, last]).ravel()
+        for first, inner, last in (
+            (ends[:, 0], x.reshape(n_units, -1), ends[:, 1]),
+            (sag[:, 0] - slope[:, 0] * half, sag, sag[:, -1] + slope[:, -1] * half),
+            (slope[:, 0], slope, slope[:, -1]),
+        )
+    )
 
 
 def reduce(
@@ -290,16 +381,18 @@ def _rail_pieces(
     nodes[-1] -= 1e-9  # just before the joint
     units = n_connectors * np.arange(rail.units_per_span)[:, None]
     x = span * length + spacing * (units + nodes).ravel()
-    right_z, right_slope_z, right_y, right_slope_y = model.rail_rows(x, 1)
-    left_z, left_slope_z, left_y, left_slope_y = model.rail_rows(x, -1)
+    right_z, _, right_y, _ = model.rail_rows(x, 1)
+    left_z, _, left_y, _ = model.rail_rows(x, -1)
+    right_turn_z, right_turn_y = model.rail_section_rows(x, 1)
+    left_turn_z, left_turn_y = model.rail_section_rows(x, -1)
     shapes = basis[:, columns].toarray()
 
-    def coefficients(value: sp.csr_array, slope: sp.csr_array) -> Array:
-        ends = np.stack([value @ shapes, slope @ shapes * spacing], axis=1)
+    def coefficients(value: sp.csr_array, turn: sp.csr_array) -> Array:
+        ends = np.stack([value @ shapes, turn @ shapes * spacing], axis=1)
         return ends.reshape(-1, columns.size).T / 2
 
     return (
-        coefficients(right_z + left_z, right_slope_z + left_slope_z),
-        coefficients(right_z - left_z, right_slope_z - left_slope_z),
-        coefficients(right_y + left_y, right_slope_y + left_slope_y),
+        coefficients(right_z + left_z, right_turn_z + left_turn_z),
+        coefficients(right_z - left_z, right_turn_z - left_turn_z),
+        coefficients(right_y + left_y, right_turn_y + left_turn_y),
     )
