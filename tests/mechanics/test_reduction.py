@@ -208,7 +208,7 @@ def test_pieces_carry_the_rails_motion_in_every_coordinate(name):
         columns = REDUCED.span_coordinates[j]
         exact = rows @ REDUCED.basis[:, columns].toarray()
         found = design @ getattr(REDUCED, name)[j].T
-        assert_allclose(found, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
+        assert_allclose(found, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
 
 
 def test_pieces_carry_the_rails_deflection_under_a_uniform_load():
