@@ -26,7 +26,7 @@ Array = npt.NDArray[np.float64]
 _SAG_POINTS = 32
 """Places within a pole pitch at which the standing sag is tabulated [-]; assumed."""
 
-DAMPING_DROP = 1e-3
+DAMPING_DROP = 3e-3
 """Entries of the damping matrix below this share of their diagonals are dropped [-]; assumed,
 checked in the tests against the damping ratio of every mode."""
 
