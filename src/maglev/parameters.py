@@ -756,7 +756,7 @@ class Passage(Parameters):
         "Hz",
         "highest mode of the middle span, where responses are taken, in the production solver; "
         "damping is a share of critical up to here",
-        1000,
+        500,
         source="D",
         confidence="M",
         above=0,
@@ -764,7 +764,7 @@ class Passage(Parameters):
     mode_cutoff_elsewhere: float = quantity(
         "Hz",
         "highest mode of piers and other spans in the production solver",
-        400,
+        300,
         source="D",
         confidence="M",
         above=0,
