@@ -15,6 +15,7 @@ from maglev.uncertainty.reliability import (
     LOST,
     density_distance,
     density_exceedance,
+    error_range_near,
     exceedance,
     kolmogorov_distance,
     kolmogorov_noise,
@@ -268,3 +269,32 @@ def test_faulty_input_is_refused_with_a_sentence():
     ):
         with pytest.raises(ValueError, match=sentence):
             call()
+
+
+def test_the_range_of_errors_near_a_value_is_that_of_its_neighbours():
+    values = np.arange(100.0)
+    residuals = np.where(values > 60.0, 5.0, 1.0) * np.where(values % 2, 1.0, -1.0)
+    low, high = error_range_near([0.0, 99.0, 45.0], values, residuals, 0.95)
+    assert_allclose(low, [-1.0, -5.0, -5.0])  # 39 neighbours: 0-38, 61-99, 26-64
+    assert_allclose(high, [1.0, 5.0, 5.0])
+
+
+def test_the_range_of_few_errors_holds_one_more_as_often_as_the_confidence_says():
+    rng = np.random.default_rng(3)
+    hits = []
+    for _ in range(2000):
+        residuals = rng.standard_normal(9)
+        low, high = error_range_near([0.0], np.zeros(8), residuals[:8], 0.8)
+        hits.append(low[0] <= residuals[8] <= high[0])
+    assert abs(np.mean(hits) - 0.8) < 0.03
+
+
+def test_an_error_range_moves_both_ends_of_a_surrogate_limit():
+    predictions = np.random.default_rng(4).standard_normal(5000)
+    plain = surrogate_limits(predictions, [0.1], error_range=(0.0, 0.0))
+    moved = surrogate_limits(predictions, [0.1], error_range=(-0.25, 0.5))
+    assert moved.limit == plain.limit
+    assert_allclose(moved.lower - plain.lower, -0.25)
+    assert_allclose(moved.upper - plain.upper, 0.5)
+    with pytest.raises(ValueError, match="must be finite and ascend"):
+        surrogate_limits(predictions, [0.1], error_range=(1.0, 0.0))

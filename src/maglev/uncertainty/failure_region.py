@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 from scipy.special import expit
+from scipy.stats import binomtest
 from sklearn.linear_model import LogisticRegression
 
 from maglev.uncertainty._border_kernels import border_chain
@@ -166,8 +167,94 @@ def fit_failure_region(
     return FailureRegion(borders=borders * prior, n_parameters=s)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Loss:
+    """What is known of the probability that a sample is lost.
+
+    Parameters
+    ----------
+    probability
+        Estimate [-].
+    lower, upper
+        Ends of its interval [-].
+    region
+        The learnt region; None where no sample was lost, and then nothing is known of where.
+    """
+
+    probability: float
+    lower: float
+    upper: float
+    region: FailureRegion | None
+
+    def lost_probability(self, points: npt.ArrayLike) -> Array:
+        """Probability (point,) that a sample at each point (point, parameter) is lost [-]."""
+        if self.region is None:
+            return np.zeros(len(np.asarray(points)))
+        return self.region.lost_probability(points)
+
+
+def learnt_loss(
+    points: npt.ArrayLike,
+    lost: npt.ArrayLike,
+    population: npt.ArrayLike,
+    rng: np.random.Generator,
+    confidence: float = 0.95,
+) -> Loss:
+    """Probability of being lost, from the region learnt or, where none was lost, by counting.
+
+    With lost samples the interval is the credible one of the region.  Without, the estimate is
+    zero and the upper end is the exact binomial one; it takes the samples as drawn at random, and
+    so is too wide for a design that goes for the tails.
+
+    Parameters
+    ----------
+    points : (sample, parameter)
+        Every standardised sample, held or lost [-].
+    lost : (sample,) of bool
+        Which samples were lost.
+    population : (point, parameter)
+        Equally likely draws from the input density, standardised [-].
+    rng
+        Source of the draws of the border.
+    confidence
+        Two-sided confidence of the interval [-].
+
+    Returns
+    -------
+    loss
+        Probability, interval and region.
+
+    Raises
+    ------
+    ValueError
+        As `fit_failure_region` and `FailureRegion.total_probability`, or if the confidence lies
+        outside (0, 1).
+
+    References
+    ----------
+    Clopper, Pearson, Biometrika 26 (1934) 404-413.
+    """
+    lost = np.asarray(lost)
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence must lie in (0, 1), got {confidence}")
+    if lost.size and not lost.any():
+        bound = binomtest(0, lost.size).proportion_ci(confidence, "exact")
+        return Loss(probability=0.0, lower=0.0, upper=float(bound.high), region=None)
+    region = fit_failure_region(points, lost, rng)
+    total = region.total_probability(population)
+    outside = 0.5 * (1.0 - confidence)
+    lower, upper = np.quantile(total, [outside, 1.0 - outside])
+    probability = float(np.clip(total.mean(), lower, upper))
+    return Loss(probability=probability, lower=float(lower), upper=float(upper), region=region)
+
+
 def border_batch(
-    region: FailureRegion, occupied: npt.ArrayLike, candidates: npt.ArrayLike, n_new: int
+    region: FailureRegion,
+    occupied: npt.ArrayLike,
+    candidates: npt.ArrayLike,
+    n_new: int,
+    *,
+    scores: Array | None = None,
 ) -> npt.NDArray[np.int64]:
     """Candidates whose outcome says most about the probability of being lost.
 
@@ -185,6 +272,8 @@ def border_batch(
         Equally likely draws from the input density, standardised [-].
     n_new
         How many to choose.
+    scores : (n_new,), optional
+        Receives the variance that each candidate takes away at the time it was chosen [-].
 
     Returns
     -------
@@ -223,6 +312,8 @@ def border_batch(
         best = int(np.argmax(np.where(free, gain, -1.0)))
         free[best] = False
         chosen[place] = pool[best]
+        if scores is not None:
+            scores[place] = gain[best] / total.size
         if not known[best]:
             explained = outcome[best] / np.sqrt(square[best])
             total = total - (total @ explained) * explained

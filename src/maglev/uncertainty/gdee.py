@@ -51,6 +51,10 @@ _RULE_TOLERANCE = 0.02  # of the bandwidth, well below its own uncertainty, assu
 _CHUNK = 512  # points whose increments are held in memory at once, assumed
 
 
+class _TooManySteps(ValueError):
+    """Values far out ask for more than ``MOST_STEPS`` time steps."""
+
+
 @dataclass(frozen=True)
 class EvolvedDensity:
     """Density of an extreme value by the generalised density evolution equation.
@@ -193,6 +197,67 @@ def evolved_density(
         kernel_deviation=float(np.sqrt(probability @ spread)) * mesh * deviation,
         start=mean + deviation * origin,
     )
+
+
+def density_with_strays(
+    values: npt.ArrayLike,
+    probability: npt.ArrayLike | None = None,
+    *,
+    lost_probability: float = 0.0,
+) -> tuple[EvolvedDensity, bool] | None:
+    """Density by PDEM where it can be had: of the values, or else of their logarithms.
+
+    A few values far out ask for more time steps than are sensible.  The logarithms of positive
+    values may not; their density p_L is mapped back by ``p(y) = p_L(ln y) / y``.
+
+    Parameters
+    ----------
+    values, probability, lost_probability
+        As `evolved_density` takes them.
+
+    Returns
+    -------
+    evolved, logarithmic
+        The density and whether it went by the logarithm: ``mesh``, ``bandwidth`` and
+        ``kernel_deviation`` are then those at the mean of the values, and the cells grow with the
+        value.  None if the evolution refuses both: `direct_density` is what is left.
+
+    Raises
+    ------
+    ValueError
+        As `evolved_density` does for a faulty sample.
+
+    References
+    ----------
+    docs/theory/pdem.md, sec. 5.
+    """
+    values, probability = weighted_sample(values, probability)
+    mean, _ = _moments(values, probability)
+    check_lost_probability(lost_probability)
+    try:
+        evolved = evolved_density(values, probability, lost_probability=lost_probability)
+    except _TooManySteps:
+        pass
+    else:
+        return evolved, False
+    if not np.all(values > 0.0):
+        return None
+    try:
+        evolved = evolved_density(np.log(values), probability, lost_probability=lost_probability)
+    except _TooManySteps:
+        return None
+    centre = np.exp(evolved.cell_centre)
+    mapped = EvolvedDensity(
+        cell_centre=centre,
+        density=evolved.density / centre,
+        mesh=evolved.mesh * mean,
+        n_steps=evolved.n_steps,
+        largest_courant=evolved.largest_courant,
+        bandwidth=evolved.bandwidth * mean,
+        kernel_deviation=evolved.kernel_deviation * mean,
+        start=float(np.exp(evolved.start)),
+    )
+    return mapped, True
 
 
 def direct_density(
@@ -417,7 +482,7 @@ def _virtual_evolution(
     rate = 2.5 * np.pi if process == "sine" else 1.0  # largest slope of g
     n_steps = max(1, int(np.ceil(rate * farthest / COURANT)))
     if n_steps > MOST_STEPS:
-        raise ValueError(
+        raise _TooManySteps(
             f"a mesh of {mesh:.3g} standard deviations needs {n_steps} time steps over values that "
             f"spread this far, expected {MOST_STEPS} at most; give a wider mesh, take logarithms "
             "of the values, or use direct_density"

@@ -278,6 +278,7 @@ def surrogate_limits(
     *,
     residuals: npt.ArrayLike | None = None,
     standard_deviation: npt.ArrayLike | None = None,
+    error_range: tuple[float, float] | None = None,
     lost_probability: float = 0.0,
     lost_interval: tuple[float, float] | None = None,
     confidence: float = 0.95,
@@ -300,7 +301,10 @@ def surrogate_limits(
         Leave-one-out residuals, computed value less prediction [unit]; those of the training
         points near the tail alone, where errors differ across the domain.
     standard_deviation : (sample,), optional
-        Posterior deviation of each prediction [unit].  Exactly one of the two is to be given.
+        Posterior deviation of each prediction [unit].
+    error_range : optional
+        Lower and upper end of the surrogate's error, as `error_range_near` gives it [unit].
+        Exactly one of the three is to be given.
     lost_probability
         Probability that a sample is lost [-].
     lost_interval
@@ -317,9 +321,10 @@ def surrogate_limits(
     Raises
     ------
     ValueError
-        If the predictions are faulty, not exactly one of ``residuals`` and ``standard_deviation``
-        is given, it is faulty, there are too few residuals for the confidence, a level or the
-        confidence lies outside (0, 1), or the loss probabilities are out of range or order.
+        If the predictions are faulty, not exactly one of ``residuals``, ``standard_deviation`` and
+        ``error_range`` is given, it is faulty, there are too few residuals for the confidence, a
+        level or the confidence lies outside (0, 1), or the loss probabilities are out of range or
+        order.
 
     References
     ----------
@@ -339,15 +344,20 @@ def surrogate_limits(
             f"the interval of the lost probability must hold it within [0, 1), got {fewest} to "
             f"{most} around {lost_probability}"
         )
-    if (residuals is None) == (standard_deviation is None):
+    given_errors = [one is not None for one in (residuals, standard_deviation, error_range)]
+    if sum(given_errors) != 1:
         raise ValueError(
-            "the surrogate's error must be given as either residuals or standard_deviation, got "
-            + ("neither" if residuals is None else "both")
+            "the surrogate's error must be given as either residuals or standard_deviation or "
+            f"error_range, got {('neither', 'one', 'both', 'all three')[sum(given_errors)]}"
         )
     low: float | FloatArray
     high: float | FloatArray
     if residuals is not None:
         low, high = _residual_quantiles(residuals, confidence)
+    elif error_range is not None:
+        low, high = error_range
+        if not (np.isfinite(low) and np.isfinite(high) and low <= high):
+            raise ValueError(f"the range of errors must be finite and ascend, got {low} to {high}")
     else:
         spread = np.asarray(standard_deviation, dtype=float)
         if spread.shape != predictions.shape:
@@ -383,6 +393,66 @@ def surrogate_limits(
     )
 
 
+def error_range_near(
+    at: npt.ArrayLike,
+    values: npt.ArrayLike,
+    residuals: npt.ArrayLike,
+    confidence: float = 0.95,
+) -> tuple[FloatArray, FloatArray]:
+    """Range of a surrogate's error where its response is near given values.
+
+    As many training samples as the confidence takes, those whose values are nearest, give their
+    smallest and largest leave-one-out residual.  With fewer samples than that in all, residuals
+    are taken as normal: Student's interval of one more of them.
+
+    Parameters
+    ----------
+    at : (place,)
+        Values near which the error is wanted, such as limits [unit of the value].
+    values : (training,)
+        Training values [unit].
+    residuals : (training,)
+        Their leave-one-out residuals, value less prediction [unit].
+    confidence
+        Two-sided confidence [-].
+
+    Returns
+    -------
+    low, high : (place,)
+        Ends of the range [unit].
+
+    Raises
+    ------
+    ValueError
+        If shapes disagree, something is not finite, there are fewer than two samples, or the
+        confidence lies outside (0, 1).
+
+    References
+    ----------
+    Barber et al., Ann. Stat. 49 (2021) 486-507; docs/theory/reliability.md, eqs. (7) and (9).
+    """
+    at = _checked_places(at)
+    values, residuals = np.asarray(values, dtype=float), np.asarray(residuals, dtype=float)
+    _check_confidence(confidence)
+    n = values.size
+    if values.ndim != 1 or residuals.shape != values.shape or n < 2:
+        raise ValueError(
+            f"values and residuals have shapes {values.shape} and {residuals.shape}, expected "
+            "(training,) twice, with two samples or more"
+        )
+    if not (np.isfinite(values).all() and np.isfinite(residuals).all()):
+        raise ValueError("values and residuals must be finite, got NaN or infinity among them")
+    n_near = _fewest_residuals(confidence)
+    if n < n_near:
+        quantile = stats.t.ppf(0.5 + 0.5 * confidence, n - 1)
+        half = quantile * residuals.std(ddof=1) * np.sqrt(1.0 + 1.0 / n)
+        mean = residuals.mean()
+        return np.full(at.size, mean - half), np.full(at.size, mean + half)
+    distance = np.abs(at[:, None] - values)
+    near = np.argsort(distance, axis=1, kind="stable")[:, :n_near]
+    return residuals[near].min(axis=1), residuals[near].max(axis=1)
+
+
 def kolmogorov_distance(
     values_a: npt.ArrayLike,
     values_b: npt.ArrayLike,
@@ -410,7 +480,7 @@ def kolmogorov_distance(
 
     References
     ----------
-    docs/theory/reliability.md, eq. (9).
+    docs/theory/reliability.md, eq. (10).
     """
     both = np.concatenate((np.asarray(values_a, dtype=float), np.asarray(values_b, dtype=float)))
     a = exceedance(both, values_a, probability_a)
@@ -475,7 +545,7 @@ def wasserstein_distance(
 
     References
     ----------
-    scipy.stats.wasserstein_distance; docs/theory/reliability.md, eq. (10).
+    scipy.stats.wasserstein_distance; docs/theory/reliability.md, eq. (11).
     """
     values_a, probability_a = weighted_sample(values_a, probability_a)
     values_b, probability_b = weighted_sample(values_b, probability_b)
@@ -509,7 +579,7 @@ def density_distance(
 
     References
     ----------
-    docs/theory/reliability.md, eq. (11).
+    docs/theory/reliability.md, eq. (12).
     """
     at_a, density_a = _checked_density(at_a, density_a)
     at_b, density_b = _checked_density(at_b, density_b)
@@ -563,13 +633,17 @@ def _residual_quantiles(residuals: npt.ArrayLike, confidence: float) -> tuple[fl
     n = residuals.size
     rank = int(np.floor(0.5 * (1.0 - confidence) * (n + 1) * (1.0 + _ROUNDING)))
     if rank < 1:
-        fewest = int(np.ceil(2.0 / (1.0 - confidence) * (1.0 - _ROUNDING))) - 1
         raise ValueError(
-            f"a confidence of {confidence} needs at least {fewest} residuals, got {n}; train on "
-            "more points or lower the confidence"
+            f"a confidence of {confidence} needs at least {_fewest_residuals(confidence)} "
+            f"residuals, got {n}; train on more points or lower the confidence"
         )
     ranked = np.sort(residuals)
     return float(ranked[rank - 1]), float(ranked[n - rank])
+
+
+def _fewest_residuals(confidence: float) -> int:
+    """How many residuals have their smallest and largest as an interval of the confidence."""
+    return int(np.ceil(2.0 / (1.0 - confidence) * (1.0 - _ROUNDING))) - 1
 
 
 def _status(expected: FloatArray, lost: npt.NDArray[np.bool_]) -> tuple[str, ...]:

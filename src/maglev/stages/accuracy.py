@@ -1,0 +1,138 @@
+"""What accuracy a number of runs buys: limits of each method against those of the baseline."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from maglev.datasets import METHODS, RESPONSES
+from maglev.parameters import Config
+from maglev.stages.extremes import coordinates, extremes, lost, method_number
+from maglev.stages.limits import baseline_limits
+from maglev.stages.surrogate import predictor
+from maglev.uncertainty.reliability import sample_limits
+
+_LOG = logging.getLogger(__name__)
+
+N_STEPS = 12
+"""Numbers of runs at which a method is judged, about; assumed."""
+
+PAPER_N_RUNS = 273
+"""Number of runs for which the paper gives root mean square errors."""
+
+
+def steps(designs: Mapping[str, xr.Dataset]) -> dict[str, list[int]]:
+    """Numbers of runs at which each method is judged.
+
+    A design that was made in rounds is judged after some of them, evenly spread; a one-stage set
+    by its first samples, from as many as the smallest first design of the others has.
+
+    Parameters
+    ----------
+    designs
+        Layout ``design``, by method.
+
+    Returns
+    -------
+    n_runs
+        Ascending, by method.
+    """
+    ends = {name: design["round_n_runs"].to_numpy() for name, design in designs.items()}
+    smallest = min(int(one[0]) for one in ends.values())
+    found = {}
+    for name, design in designs.items():
+        n = design.sizes["sample"]
+        if ends[name].size > 1:
+            chosen = np.linspace(0, ends[name].size - 1, min(N_STEPS, ends[name].size))
+            numbers = set(ends[name][chosen.round().astype(int)].tolist())
+        else:
+            numbers = set(np.geomspace(min(smallest, n), n, N_STEPS).round().astype(int).tolist())
+        if min(numbers) < PAPER_N_RUNS < n:
+            numbers.add(PAPER_N_RUNS)
+        found[name] = sorted(numbers)
+    return found
+
+
+def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Judge every method by the baseline, for growing numbers of its runs.
+
+    Surrogates are evaluated at the baseline's own points, so that its sampling noise, which both
+    have in common, is not in the differences.  It is in the truth: half the interval of each of
+    the baseline's limits stands beside them.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    baseline
+        Layout ``runs``.
+    designs
+        Layout ``design``, by method.
+
+    Returns
+    -------
+    dataset
+        Layout ``accuracy``; NaN where a method has no such step, too few samples held for a
+        surrogate, or the limit is not given.
+
+    Raises
+    ------
+    ValueError
+        If a design cannot be fitted.
+    """
+    levels = config.study.failure_probability
+    truth, away = extremes(baseline), lost(baseline)
+    points = baseline["standard"].to_numpy()
+    sigma = truth[~away].std(axis=0)
+    reference = baseline_limits(config, truth, away)
+    reference_limit = np.array([one.limit for one in reference])
+    width = np.array([one.upper - one.lower for one in reference])
+
+    sizes = steps(designs)
+    n_steps = max(len(one) for one in sizes.values())
+    shape = (len(designs), n_steps, len(RESPONSES))
+    n_runs = np.zeros(shape[:2], dtype=int)
+    rmse, limit = np.full(shape, np.nan), np.full((*shape, len(levels)), np.nan)
+    names = sorted(designs, key=METHODS.index)
+    for row, name in enumerate(names):
+        choice = getattr(config.study, name).surrogate
+        for step, n in enumerate(sizes[name]):
+            n_runs[row, step] = n
+            part = designs[name].isel(sample=slice(0, n))
+            if np.count_nonzero(~lost(part)) < part.sizes["parameter"] + 3:
+                continue  # no linear tail with one sample left out
+            found = predictor(config, part, choice)
+            predicted, held = found.surrogate.predict(points), found.held(points)
+            rmse[row, step] = np.sqrt(np.mean((predicted - truth)[~away] ** 2, axis=0))
+            if held.any():
+                limit[row, step] = [
+                    sample_limits(
+                        predicted[held, response], levels, n_lost=int(np.count_nonzero(~held))
+                    ).limit
+                    for response in range(len(RESPONSES))
+                ]
+        _LOG.info("%s: judged at %s runs", name, ", ".join(map(str, sizes[name])))
+    of_step = ("method", "step", "response")
+    level = ("response", "failure_probability")
+    return xr.Dataset(
+        {
+            "step_n_runs": (of_step[:2], n_runs),
+            "step_limit": ((*of_step, "failure_probability"), limit),
+            "step_limit_error": (
+                (*of_step, "failure_probability"),
+                (limit - reference_limit) / sigma[:, None],
+            ),
+            "step_rmse": (of_step, rmse),
+            "reference_limit": (level, reference_limit),
+            "reference_half_width": (level, 0.5 * width / sigma[:, None]),
+            "sigma": ("response", sigma),
+        },
+        coords=coordinates(
+            method=np.array([method_number(name) for name in names]),
+            step=np.arange(n_steps),
+            failure_probability=list(levels),
+        ),
+    )

@@ -1,0 +1,236 @@
+"""Density and exceedance of the six extremes: of a surrogate, or of the baseline itself."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import xarray as xr
+from scipy import stats
+
+from maglev.datasets import DENSITY_METHODS, RESPONSES
+from maglev.parameters import Config
+from maglev.stages.extremes import FloatArray, coordinates, extremes, lost
+from maglev.stages.surrogate import loss_comment, stored_predictor
+from maglev.uncertainty.gdee import density_with_strays, direct_density, silverman_bandwidth
+from maglev.uncertainty.reliability import error_range_near, exceedance
+from maglev.uncertainty.samples import held_part
+
+_LOG = logging.getLogger(__name__)
+
+N_BODY, N_TAIL = 801, 200
+"""Places at which a density is given: evenly over its body, and ever wider apart in its tail."""
+
+REACH = 4.0
+"""Bandwidths beyond the smallest and the largest value at which a density is still given; a
+normal kernel has fallen to 3e-4 of its peak there."""
+
+COMMENT = "density of the held part: it integrates to one less lost_probability"
+
+
+def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
+    """Direct density and counted exceedance of independent runs, with the binomial interval.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    runs
+        Layout ``runs``: the baseline.
+
+    Returns
+    -------
+    dataset
+        Layout ``density``; ``density``, ``mesh_size`` and ``peak`` of the GDEE are NaN.
+
+    Raises
+    ------
+    ValueError
+        If no run held.
+    """
+    values, away = extremes(runs), lost(runs)
+    n = away.size
+    columns = []
+    for response in range(len(RESPONSES)):
+        held = held_part(values[:, response], away)
+        column = _column(held.values, held.probability, held.lost_probability)
+        n_beyond = np.round(column["exceedance"] * n)
+        low, high = binomial_interval(n_beyond, n, config.study.confidence)
+        columns.append(column | {"exceedance_low": low, "exceedance_high": high})
+    result = _dataset(columns, float(away.mean()), n)
+    result["exceedance"].attrs["comment"] = "interval: exact binomial, at each value by itself"
+    return result
+
+
+def of_surrogate(
+    config: Config, design: xr.Dataset, surrogate: xr.Dataset, eev: xr.Dataset
+) -> xr.Dataset:
+    """Density by the GDEE of the extremes predicted at the representative points.
+
+    Points that are more likely lost than held are left out, the others keep their proportions;
+    the probability of loss is that of the surrogate's file.  Exceedance is the exact weighted one.
+    Its interval moves the predictions by the range of leave-one-out residuals near each value and
+    the lost probability to the ends of its own interval, where runs were lost.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    design
+        Layout ``design``.
+    surrogate
+        Layout ``surrogate``, of this design.
+    eev
+        Layout ``eev``, of this surrogate.
+
+    Returns
+    -------
+    dataset
+        Layout ``density``; ``density_method`` says where strays made the GDEE go by the logarithm
+        or refuse; a density that it refused is the direct one.
+
+    Raises
+    ------
+    ValueError
+        If every representative point is likely lost.
+
+    References
+    ----------
+    docs/theory/pdem.md; docs/theory/reliability.md, eqs. (2), (7) and (9).
+    """
+    found = stored_predictor(config, design, surrogate)
+    training, residuals = found.surrogate.values, found.surrogate.leave_one_out()
+    predicted, probability = eev["predicted"].to_numpy(), eev["probability"].to_numpy()
+    likely_lost = eev["lost_probability_at"].to_numpy() >= 0.5
+    loss = found.loss
+    least, most = (loss.lower, loss.upper) if loss.region is not None else (0.0, 0.0)
+    columns = []
+    for response, name in enumerate(RESPONSES):
+        held = held_part(predicted[:, response], likely_lost, probability)
+        sample = (held.values, held.probability)
+        column = _column(*sample, loss.probability)
+        evolved = density_with_strays(*sample, lost_probability=loss.probability)
+        if evolved is None:
+            _LOG.warning("%s: strays, the GDEE was refused; the density is the direct one", name)
+            column["density"] = column["density_direct"]
+        else:
+            density, logarithmic = evolved
+            column |= {
+                "density": np.interp(
+                    column["value"], density.cell_centre, density.density, left=0.0, right=0.0
+                ),
+                "mesh_size": density.mesh,
+                "peak": density.density.max(),
+                "density_method": DENSITY_METHODS.index(
+                    "gdee_of_the_logarithm" if logarithmic else "gdee"
+                ),
+            }
+        low, high = error_range_near(
+            column["value"], training[:, response], residuals[:, response], config.study.confidence
+        )
+        at = column["value"]
+        lower = exceedance(at - low, *sample, lost_probability=least)
+        upper = exceedance(at - high, *sample, lost_probability=most)
+        columns.append(
+            column
+            | {
+                "exceedance_low": np.minimum.accumulate(np.minimum(lower, column["exceedance"])),
+                "exceedance_high": np.maximum.accumulate(
+                    np.maximum(upper, column["exceedance"])[::-1]
+                )[::-1],
+            }
+        )
+    result = _dataset(columns, loss.probability, design.sizes["sample"])
+    result["lost_probability"].attrs["comment"] = loss_comment(loss)
+    result["exceedance"].attrs["comment"] = (
+        "exact weighted distribution of the representative points; interval: leave-one-out "
+        "residuals of the training samples near each value"
+    )
+    return result
+
+
+def binomial_interval(
+    n_beyond: FloatArray | float, n: int, confidence: float
+) -> tuple[FloatArray, FloatArray]:
+    """Exact interval of a probability of which ``n_beyond`` of ``n`` samples speak.
+
+    Parameters
+    ----------
+    n_beyond : (...)
+        Numbers of samples.
+    n
+        Number of all.
+    confidence
+        Two-sided confidence [-].
+
+    Returns
+    -------
+    low, high : (...)
+        Ends of the interval [-].
+
+    References
+    ----------
+    Clopper, Pearson, Biometrika 26 (1934) 404-413.
+    """
+    k = np.asarray(n_beyond, dtype=float)
+    outside = 0.5 * (1.0 - confidence)
+    low = np.where(k > 0, stats.beta.ppf(outside, np.maximum(k, 1), n - k + 1), 0.0)
+    high = np.where(k < n, stats.beta.ppf(1.0 - outside, k + 1, np.maximum(n - k, 1)), 1.0)
+    return low, high
+
+
+def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> FloatArray:
+    """Where a density is given (place,): all around its body, sparsely towards strays.
+
+    Parameters
+    ----------
+    values, probability : (sample,)
+        Weighted values [their unit].
+    bandwidth
+        Kernel deviation [unit].
+    """
+    first, last = values.min() - REACH * bandwidth, values.max() + REACH * bandwidth
+    body = np.quantile(values, 0.99, weights=probability, method="inverted_cdf") + 8.0 * bandwidth
+    body = min(body, first + 0.9 * (last - first))
+    tail = body + (last - body) * (np.arange(1, N_TAIL + 1) / N_TAIL) ** 2
+    return np.concatenate([np.linspace(first, body, N_BODY), tail])
+
+
+def _column(values: FloatArray, probability: FloatArray, lost_probability: float) -> dict:
+    """What a density file holds of one response whose density is direct."""
+    bandwidth = silverman_bandwidth(values, probability)
+    at = places(values, probability, bandwidth)
+    sample = (at, values, probability)
+    direct = direct_density(*sample, bandwidth=bandwidth, lost_probability=lost_probability)
+    mean = probability @ values
+    deviation = np.sqrt(probability @ (values - mean) ** 2)
+    return {
+        "value": at,
+        "density": np.full(at.size, np.nan),
+        "density_direct": direct,
+        "exceedance": exceedance(*sample, lost_probability=lost_probability),
+        "bandwidth": bandwidth,
+        "mesh_size": np.nan,
+        "density_method": DENSITY_METHODS.index("direct"),
+        "peak": np.nan,
+        "peak_direct": direct.max(),
+        "mean": mean,
+        "standard_deviation": deviation,
+        "skewness": probability @ (values - mean) ** 3 / deviation**3,
+    }
+
+
+def _dataset(columns: list[dict], lost_probability: float, n_runs: int) -> xr.Dataset:
+    """The file's dataset from what it holds of each response."""
+    variables = {}
+    for name in columns[0]:
+        stacked = np.array([column[name] for column in columns])
+        variables[name] = (("response", "cell")[: stacked.ndim], stacked)
+    n_cells = variables["value"][1].shape[1]
+    result = xr.Dataset(
+        {**variables, "lost_probability": ((), lost_probability), "n_runs": ((), n_runs)},
+        coords=coordinates(cell=np.arange(n_cells)),
+    )
+    for name in ("density", "density_direct"):
+        result[name].attrs["comment"] = COMMENT
+    return result

@@ -1,0 +1,46 @@
+"""Predicted extremes at the representative points, and where levitation would be lost."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from maglev.datasets import GAINS
+from maglev.parameters import Config
+from maglev.stages.extremes import coordinates
+from maglev.stages.surrogate import stored_predictor
+
+
+def dataset(
+    config: Config, design: xr.Dataset, surrogate: xr.Dataset, points: xr.Dataset
+) -> xr.Dataset:
+    """Predict the six extremes at the representative points.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    design
+        Layout ``design``.
+    surrogate
+        Layout ``surrogate``, of this design.
+    points
+        Layout ``points``: the representative ones.
+
+    Returns
+    -------
+    dataset
+        Layout ``eev``.  Extremes are predicted at every point, also where it is likely lost: there
+        they mean nothing, see ``lost_probability_at``.
+    """
+    found = stored_predictor(config, design, surrogate)
+    at = points["standard"].to_numpy()
+    of_response = ("sample", "response")
+    return xr.Dataset(
+        {
+            **{name: points[name] for name in (*GAINS, "standard", "probability")},
+            "predicted": (of_response, found.surrogate.predict(at)),
+            "deviation": (of_response, found.surrogate.standard_deviation(at)),
+            "lost_probability_at": ("sample", found.loss.lost_probability(at)),
+        },
+        coords=coordinates(sample=points["sample"], parameter=points["parameter"]),
+    )

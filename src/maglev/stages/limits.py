@@ -1,0 +1,219 @@
+"""Limits of the six extremes at the failure probabilities, with intervals and a word on each."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import xarray as xr
+
+from maglev.datasets import LIMIT_STATUS, RESPONSES
+from maglev.parameters import Config
+from maglev.stages.density import binomial_interval
+from maglev.stages.extremes import FloatArray, coordinates, extremes, lost, population
+from maglev.stages.surrogate import loss_comment, stored_predictor
+from maglev.uncertainty.reliability import (
+    BEYOND_SAMPLE,
+    GIVEN,
+    LOST,
+    Limits,
+    error_range_near,
+    sample_limits,
+    surrogate_limits,
+)
+
+_LOG = logging.getLogger(__name__)
+
+_STATUS = {GIVEN: "given", BEYOND_SAMPLE: "too_few_exceedances", LOST: "infinite"}
+
+
+def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
+    """Limits of independent runs with exact order-statistic intervals.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    runs
+        Layout ``runs``: the baseline.
+
+    Returns
+    -------
+    dataset
+        Layout ``limits``.
+    """
+    values, away = extremes(runs), lost(runs)
+    n_lost = int(np.count_nonzero(away))
+    limits = baseline_limits(config, values, away)
+    low, high = binomial_interval(n_lost, away.size, config.study.confidence)
+    result = _dataset(
+        config,
+        limits,
+        lost_probability=(n_lost / away.size, float(low), float(high)),
+        n_runs=away.size,
+        sigma=values[~away].std(axis=0),
+    )
+    result["limit"].attrs["comment"] = "interval: order statistics, exact"
+    result["lost_probability"].attrs["comment"] = "counted; the interval is the exact binomial one"
+    return result
+
+
+def baseline_limits(config: Config, values: FloatArray, away: np.ndarray) -> list[Limits]:
+    """Limits of each response of independent runs.
+
+    Parameters
+    ----------
+    config
+        The configuration: levels and confidence.
+    values : (sample, response)
+        Extremes [their unit], anything where ``away``.
+    away : (sample,) of bool
+        Which samples were lost.
+    """
+    return [
+        sample_limits(
+            values[~away, response],
+            config.study.failure_probability,
+            n_lost=int(np.count_nonzero(away)),
+            confidence=config.study.confidence,
+        )
+        for response in range(values.shape[1])
+    ]
+
+
+def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> xr.Dataset:
+    """Limits off a surrogate at a large population, its own error carried into the interval.
+
+    The population is a scrambled Sobol' set taken for independent draws, which makes the sampling
+    part of the interval too wide rather than too narrow.  Where no run was lost, the probability
+    of loss enters the limits as zero; what is not known about it stands in its own interval.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    design
+        Layout ``design``.
+    surrogate
+        Layout ``surrogate``, of this design.
+
+    Returns
+    -------
+    dataset
+        Layout ``limits``.
+
+    Raises
+    ------
+    ValueError
+        If all of the population is likely lost.
+
+    References
+    ----------
+    docs/theory/reliability.md, eqs. (5), (6), (7) and (9).
+    """
+    found = stored_predictor(config, design, surrogate)
+    training, residuals, loss = (
+        found.surrogate.values,
+        found.surrogate.leave_one_out(),
+        found.loss,
+    )
+    points = population(config.seed, config.study.n_population, design.sizes["parameter"])
+    held = found.held(points)
+    if not held.any():
+        raise ValueError(f"all {held.size} points of the population are predicted to be lost")
+    predictions = found.surrogate.predict(points[held])
+    learnt = loss.region is not None
+    limits = []
+    for response in range(len(RESPONSES)):
+        common = {
+            "lost_probability": loss.probability,
+            "lost_interval": (loss.lower, loss.upper) if learnt else None,
+            "confidence": config.study.confidence,
+        }
+        levels = config.study.failure_probability
+        plain = surrogate_limits(predictions[:, response], levels, error_range=(0.0, 0.0), **common)
+        # a limit that is not given has no place; any range serves it
+        at = np.where(np.isnan(plain.limit), training[:, response].max(), plain.limit)
+        low, high = error_range_near(
+            at, training[:, response], residuals[:, response], config.study.confidence
+        )
+        ends = [
+            surrogate_limits(
+                predictions[:, response], level, error_range=(low[k], high[k]), **common
+            )
+            for k, level in enumerate(levels)
+        ]
+        limits.append(
+            Limits(
+                failure_probability=plain.failure_probability,
+                limit=plain.limit,
+                lower=np.concatenate([one.lower for one in ends]),
+                upper=np.concatenate([one.upper for one in ends]),
+                expected_exceedances=plain.expected_exceedances,
+                status=plain.status,
+                confidence=plain.confidence,
+            )
+        )
+    result = _dataset(
+        config,
+        limits,
+        lost_probability=(loss.probability, loss.lower, loss.upper),
+        n_runs=design.sizes["sample"],
+        sigma=predictions.std(axis=0),
+    )
+    result["limit"].attrs["comment"] = (
+        "interval: order statistics of the population moved by the range of leave-one-out "
+        "residuals of the training samples nearest to the limit"
+        + ("" if learnt else "; no run was lost, the lost probability counts as zero")
+    )
+    result["lost_probability"].attrs["comment"] = loss_comment(loss)
+    return result
+
+
+def status_numbers(limits: Limits) -> list[int]:
+    """What can be said of each limit, as the code of a file (level,)."""
+    return [LIMIT_STATUS.index(_STATUS[status]) for status in limits.status]
+
+
+def _dataset(
+    config: Config,
+    limits: list[Limits],
+    *,
+    lost_probability: tuple[float, float, float],
+    n_runs: int,
+    sigma: FloatArray,
+) -> xr.Dataset:
+    level = ("response", "failure_probability")
+    status = np.array([status_numbers(one) for one in limits])
+    infinite = status == LIMIT_STATUS.index("infinite")
+
+    def column(name: str) -> FloatArray:
+        """An infinite limit is written as such, with an unbounded interval above."""
+        values = np.array([getattr(one, name) for one in limits])
+        return values if name == "lower" else np.where(infinite, np.inf, values)
+
+    for response, name in enumerate(RESPONSES):
+        said = [
+            f"{p:g}: {value:.4g}" if code == 0 else f"{p:g}: {LIMIT_STATUS[code]}"
+            for p, value, code in zip(
+                config.study.failure_probability,
+                limits[response].limit,
+                status[response],
+                strict=True,
+            )
+        ]
+        _LOG.info("%s %s", name, ", ".join(said))
+    return xr.Dataset(
+        {
+            "limit": (level, column("limit")),
+            "limit_low": (level, column("lower")),
+            "limit_high": (level, column("upper")),
+            "limit_status": (level, status),
+            "lost_probability": ((), lost_probability[0]),
+            "lost_probability_low": ((), lost_probability[1]),
+            "lost_probability_high": ((), lost_probability[2]),
+            "n_runs": ((), n_runs),
+            "sigma": ("response", sigma),
+        },
+        coords=coordinates(failure_probability=list(config.study.failure_probability)),
+    )

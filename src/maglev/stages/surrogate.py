@@ -1,0 +1,221 @@
+"""Surrogate of a design: fitted to the runs that held, with the region of those that did not."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from scipy import stats
+
+from maglev.datasets import SURROGATES
+from maglev.parameters import Config
+from maglev.stages.extremes import (
+    FloatArray,
+    coordinates,
+    extremes,
+    generator,
+    lost,
+    population,
+)
+from maglev.uncertainty.failure_region import Loss, learnt_loss
+from maglev.uncertainty.selection import Selected, fit_selected, rebuilt
+from maglev.uncertainty.surrogate import relative_error
+
+_LOG = logging.getLogger(__name__)
+
+N_SOBOL, N_SOBOL_SETS = 1024, 16
+"""Points of one Saltelli set and number of sets, each with a scrambling of its own; assumed: the
+intervals come out at a few hundredths."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Predictor:
+    """What a design predicts: extremes where the train is held, and where it is not.
+
+    Parameters
+    ----------
+    surrogate
+        Surrogate of the six responses on the samples that held.
+    loss
+        Probability of lost levitation, and where.
+    """
+
+    surrogate: Selected
+    loss: Loss
+
+    def held(self, points: FloatArray) -> np.ndarray:
+        """Which standardised points (point, parameter) are more likely held than lost."""
+        return self.loss.lost_probability(points) < 0.5
+
+
+def predictor(config: Config, design: xr.Dataset, choice: str) -> Predictor:
+    """Fit the surrogate of a design and learn where its samples are lost.
+
+    Parameters
+    ----------
+    config
+        The configuration; of it ``seed`` and ``study``.
+    design
+        Layout ``design`` or ``runs``: all its samples are used.
+    choice
+        Kind of the surrogate, or ``"best"``.
+
+    Raises
+    ------
+    ValueError
+        If no or too few samples held, or they cannot be fitted.
+    """
+    points, values, away = design["standard"].to_numpy(), extremes(design), lost(design)
+    surrogate = fit_selected(points[~away], values[~away], choice)
+    return Predictor(surrogate=surrogate, loss=_loss(config, points, away))
+
+
+def stored_predictor(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> Predictor:
+    """The predictor that a file of the layout ``surrogate`` tells of, without a search.
+
+    Parameters
+    ----------
+    config
+        The configuration; of it ``seed`` and ``study``.
+    design
+        Layout ``design``.
+    surrogate
+        Layout ``surrogate``, of this design.
+    """
+    points, values, away = design["standard"].to_numpy(), extremes(design), lost(design)
+    again = rebuilt(
+        points[~away],
+        values[~away],
+        tuple(SURROGATES[number] for number in surrogate["kind"].to_numpy()),
+        surrogate["length"].to_numpy(),
+        surrogate["amplitude"].to_numpy(),
+    )
+    return Predictor(surrogate=again, loss=_loss(config, points, away))
+
+
+def dataset(config: Config, method: str, design: xr.Dataset) -> xr.Dataset:
+    """Fit the surrogate of a method's design.
+
+    Sobol' indices are those of the surrogate over all of the input density, its predictions kept
+    within the values of the runs: beyond them, towards the lost region, it would extrapolate.
+    Their intervals are those of ``N_SOBOL_SETS`` independent scramblings and do not know the
+    surrogate's own error.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    method
+        ``"osm"``, ``"asm_paper"`` or ``"asm"``: says which surrogate.
+    design
+        Layout ``design``.
+
+    Returns
+    -------
+    dataset
+        Layout ``surrogate``.
+
+    Raises
+    ------
+    ValueError
+        As `predictor`.
+
+    References
+    ----------
+    Saltelli et al., Comput. Phys. Commun. 181 (2010) 259-270; scipy.stats.sobol_indices.
+    """
+    found = predictor(config, design, getattr(config.study, method).surrogate)
+    surrogate, loss = found.surrogate, found.loss
+    first, total = sobol_indices(surrogate, config.seed, config.study.confidence)
+    error = relative_error(surrogate)
+    _LOG.info(
+        "%d runs, %d lost; %s; leave-one-out error %s",
+        design.sizes["sample"],
+        np.count_nonzero(lost(design)),
+        ", ".join(surrogate.kinds),
+        ", ".join(f"{one:.3f}" for one in error),
+    )
+    by_gain = ("response", "parameter")
+    result = xr.Dataset(
+        {
+            "kind": ("response", [SURROGATES.index(kind) for kind in surrogate.kinds]),
+            "leave_one_out_error": ("response", error),
+            "length": (by_gain, surrogate.length),
+            "amplitude": ("response", surrogate.amplitude),
+            "lost_probability": ((), loss.probability),
+            "lost_probability_low": ((), loss.lower),
+            "lost_probability_high": ((), loss.upper),
+            "sobol_first": (by_gain, first[0]),
+            "sobol_first_low": (by_gain, first[1]),
+            "sobol_first_high": (by_gain, first[2]),
+            "sobol_total": (by_gain, total[0]),
+            "sobol_total_low": (by_gain, total[1]),
+            "sobol_total_high": (by_gain, total[2]),
+        },
+        coords=coordinates(parameter=design["parameter"].to_numpy()),
+    )
+    result["lost_probability"].attrs["comment"] = loss_comment(loss)
+    result["sobol_first"].attrs["comment"] = result["sobol_total"].attrs["comment"] = (
+        "of the surrogate within the range of its training values; intervals are those of the "
+        "sampling, without the surrogate's error"
+    )
+    return result
+
+
+def loss_comment(loss: Loss) -> str:
+    """How a probability of lost levitation was found, in a sentence."""
+    if loss.region is None:
+        return "no run was lost; the upper end is the exact binomial one, as if runs were drawn"
+    return "from the region learnt from the lost runs; the interval is its credible one"
+
+
+def sobol_indices(
+    surrogate: Selected, seed: int, confidence: float
+) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
+    """First-order and total Sobol' indices of a surrogate with intervals.
+
+    Parameters
+    ----------
+    surrogate
+        Surrogate in standard normal inputs.
+    seed
+        Seed of the configuration.
+    confidence
+        Two-sided confidence of the intervals [-].
+
+    Returns
+    -------
+    first, total : three arrays (response, parameter)
+        Index, lower and upper end [-].
+    """
+    n_parameters = surrogate.points.shape[1]
+    lowest, highest = surrogate.values.min(axis=0), surrogate.values.max(axis=0)
+
+    def bounded(points: FloatArray) -> FloatArray:
+        return np.clip(surrogate.predict(points.T), lowest, highest).T
+
+    rng = generator(seed, "Sobol' indices")
+    shape = (N_SOBOL_SETS, len(surrogate.kinds), n_parameters)
+    first, total = np.empty(shape), np.empty(shape)
+    for number in range(N_SOBOL_SETS):
+        indices = stats.sobol_indices(
+            func=bounded, n=N_SOBOL, dists=[stats.norm()] * n_parameters, rng=rng
+        )
+        first[number] = indices.first_order.reshape(shape[1:])
+        total[number] = indices.total_order.reshape(shape[1:])
+    quantile = stats.t.ppf(0.5 + 0.5 * confidence, N_SOBOL_SETS - 1)
+
+    def with_ends(sets: FloatArray) -> tuple[FloatArray, ...]:
+        mean = sets.mean(axis=0)
+        half = quantile * sets.std(axis=0, ddof=1) / np.sqrt(N_SOBOL_SETS)
+        return mean, mean - half, mean + half
+
+    return with_ends(first), with_ends(total)
+
+
+def _loss(config: Config, points: FloatArray, away: np.ndarray) -> Loss:
+    everywhere = population(config.seed, config.study.n_population, points.shape[1])
+    rng = generator(config.seed, "border of the lost region")
+    return learnt_loss(points, away, everywhere, rng, config.study.confidence)

@@ -1,0 +1,103 @@
+"""What random gains and a random track each contribute to the extremes."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from maglev.datasets import RESPONSES
+from maglev.parameters import Config
+from maglev.stages.density import places
+from maglev.stages.extremes import coordinates, extremes, generator, lost
+from maglev.uncertainty.gdee import direct_density, silverman_bandwidth
+from maglev.uncertainty.samples import held_part
+from maglev.uncertainty.shares import pick_freeze_shares
+
+_LOG = logging.getLogger(__name__)
+
+
+def dataset(config: Config, both: xr.Dataset, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Densities with gains, track or both random, and the shares of the variance.
+
+    Shares are closed Sobol' indices by pick-freeze, over the samples of which all three runs held.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    both
+        Layout ``runs``: gains i on track i.
+    parts
+        Layout ``runs``, as many samples, by the names of `maglev.datasets.TRACK_PARTS`.
+
+    Returns
+    -------
+    dataset
+        Layout ``track_split``; ``gains_only`` stands on the configured track, ``track_only`` on
+        the mean gains.  ``n_runs`` counts all five sets.
+
+    Raises
+    ------
+    ValueError
+        If sets differ in size, or fewer than two samples held in all of them.
+
+    References
+    ----------
+    Janon et al., ESAIM Probab. Stat. 18 (2014) 342-364.
+    """
+    sizes = {name: part.sizes["sample"] for name, part in parts.items()}
+    n = both.sizes["sample"]
+    if set(sizes.values()) != {n}:
+        raise ValueError(f"all sets of runs must have {n} samples, got {sizes}; run them again")
+    names = ("gains_only", "track_only")
+    sets = {"both": both, **{name: parts[name] for name in names}}
+    values = {name: extremes(part) for name, part in {"both": both, **parts}.items()}
+    kept = ~np.logical_or.reduce(
+        [lost(part) for part in (both, parts["other_track"], parts["other_gains"])]
+    )
+    rng = generator(config.seed, "bootstrap of the shares")
+    rows, shares = [], []
+    for response, name in enumerate(RESPONSES):
+        held = {key: held_part(values[key][:, response], lost(part)) for key, part in sets.items()}
+        together = np.concatenate([one.values for one in held.values()])
+        widest = max(silverman_bandwidth(one.values) for one in held.values())
+        at = places(together, np.full(together.size, 1 / together.size), widest)
+        rows.append(
+            {
+                "value": at,
+                **{
+                    f"density_{key}": direct_density(
+                        at, one.values, lost_probability=one.lost_probability
+                    )
+                    for key, one in held.items()
+                },
+            }
+        )
+        share = pick_freeze_shares(
+            *(values[key][kept, response] for key in ("both", "other_track", "other_gains")),
+            rng,
+            config.study.confidence,
+        )
+        shares.append((share.first, share.second, share.interaction))
+        _LOG.info(
+            "%s: gains %.2f [%.2f, %.2f], track %.2f [%.2f, %.2f]",
+            name,
+            *share.first,
+            *share.second,
+        )
+    columns = {key: (("response", "cell"), np.array([row[key] for row in rows])) for key in rows[0]}
+    ends = np.array(shares)  # response, share, end
+    for k, name in enumerate(("gains_share", "track_share", "interaction_share")):
+        for end, suffix in enumerate(("", "_low", "_high")):
+            columns[f"{name}{suffix}"] = (("response",), ends[:, k, end])
+    result = xr.Dataset(
+        {**columns, "n_runs": ((), n * (1 + len(parts)))},
+        coords=coordinates(cell=np.arange(columns["value"][1].shape[1])),
+    )
+    result["gains_share"].attrs["comment"] = (
+        f"{np.count_nonzero(kept)} of {n} samples, those of which all three runs held"
+    )
+    return result
