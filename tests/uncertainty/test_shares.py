@@ -16,7 +16,7 @@ def runs(function, n, seed):
 def test_a_response_of_the_first_group_alone_is_all_its_share():
     shares = pick_freeze_shares(*runs(lambda a, b: 1e6 + a, 4000, 1), np.random.default_rng(0))
     assert_allclose(shares.first, 1.0, atol=1e-9)
-    assert_allclose(shares.second[0], 0.0, atol=0.04)
+    assert_allclose(shares.second[0], 0.0, atol=0.06)
 
 
 @pytest.mark.parametrize(
