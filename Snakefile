@@ -4,6 +4,7 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version, validate
 
+from maglev.datasets import METHODS, TRACK_PARTS
 from maglev.config import (
     ConfigError,
     config_text,
@@ -36,9 +37,16 @@ pathvars:
     benchmarks=f"benchmarks/results/{config['run']}",
 
 
+wildcard_constraints:
+    case="|".join(parameters.cases) or "-",
+    method="|".join(METHODS),
+
+
 include: "workflow/rules/config.smk"
 include: "workflow/rules/track.smk"
 include: "workflow/rules/validation.smk"
+include: "workflow/rules/points.smk"
+include: "workflow/rules/runs.smk"
 include: "workflow/rules/figures.smk"
 
 
@@ -51,3 +59,9 @@ rule all:
         rules.histories.output,
         rules.gaps.output,
         rules.modes.output,
+        runs_of_all_cases(),
+
+
+rule truth:
+    input:
+        [f"<results>/{case}/mcm.nc" for case in parameters.cases],

@@ -150,6 +150,135 @@ def dynamic_factor(configs: tuple[Path, ...], store: Path, threads: int, out: Pa
     save(result, out, "dynamic_factor", parameters, inputs)
 
 
+_case = click.option("--case", required=True, help="Name of the case.")
+_store = click.option("--store", type=_File, required=True, help="Folder that keeps the runs.")
+_threads = click.option("--threads", type=click.IntRange(1), default=1, help="Rows run at once.")
+
+
+def _profile(parameters: Any) -> dict[str, str]:
+    """The measured irregularity as an input, if there is one."""
+    profile = parameters.irregularity.profile_file
+    return {"profile": profile} if profile else {}
+
+
+@main.command()
+@_config
+@_case
+@click.option("--set", "name", required=True, help="Name of the point set.")
+@_out
+def points(configs: tuple[Path, ...], case: str, name: str, out: Path) -> None:
+    """Draw a point set of a case."""
+    from maglev.config import load_config
+    from maglev.stages import points, save
+
+    parameters = load_config(*configs)
+    result = points.dataset(parameters, case, name)
+    save(result, out, f"points.{name}", parameters, case=case)
+
+
+@main.command()
+@_config
+@_case
+@click.option("--points", "baseline", type=_File, required=True, help="Baseline's points.")
+@click.option("--start", type=click.IntRange(0), required=True, help="First sample.")
+@click.option("--stop", type=click.IntRange(1), required=True, help="Sample after the last.")
+@_store
+@_threads
+@_out
+def runs(
+    configs: tuple[Path, ...],
+    case: str,
+    baseline: Path,
+    start: int,
+    stop: int,
+    store: Path,
+    threads: int,
+    out: Path,
+) -> None:
+    """Run some samples of the baseline of a case, but for those that the store holds."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import runs, save
+
+    parameters = load_config(*configs)
+    drawn = datasets.read(baseline, "points")
+    result = runs.chunk(parameters, case, drawn, range(start, stop), store, threads)
+    save(result, out, "runs", parameters, _profile(parameters), case=case)
+
+
+@main.command()
+@_config
+@_case
+@click.argument("chunks", type=_File, nargs=-1, required=True)
+@_out
+def gather(configs: tuple[Path, ...], case: str, chunks: tuple[Path, ...], out: Path) -> None:
+    """Put the CHUNKS of a baseline together."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import runs, save
+
+    parameters = load_config(*configs)
+    result = runs.gather([datasets.read(path, "runs") for path in chunks])
+    save(result, out, "runs", parameters, _profile(parameters), case=case)
+
+
+@main.command("track-runs")
+@_config
+@_case
+@click.option("--part", required=True, help="Which of the further runs.")
+@_store
+@_threads
+@_out
+def track_runs(
+    configs: tuple[Path, ...], case: str, part: str, store: Path, threads: int, out: Path
+) -> None:
+    """Run what tells the gains' contribution from that of a random track."""
+    from maglev.config import load_config
+    from maglev.stages import runs, save
+
+    parameters = load_config(*configs)
+    result = runs.track_part(parameters, case, part, store, threads)
+    save(result, out, "runs.track", parameters, case=case)
+
+
+@main.command()
+@_config
+@_case
+@click.option("--method", required=True, help="Name of the method.")
+@click.option("--initial", type=_File, required=True, help="Points of the first design.")
+@click.option("--candidates", type=_File, help="Points that rounds choose from.")
+@click.option("--baseline", type=_File, help="Runs that each round is compared with.")
+@_store
+@_threads
+@_out
+def design(
+    configs: tuple[Path, ...],
+    case: str,
+    method: str,
+    initial: Path,
+    candidates: Path | None,
+    baseline: Path | None,
+    store: Path,
+    threads: int,
+    out: Path,
+) -> None:
+    """Make a design in one stage or in rounds, or go on with one that was stopped."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import design, save
+
+    parameters = load_config(*configs)
+    inputs: dict[str, Any] = {"initial": initial, "candidates": candidates}
+    points = {role: datasets.read(p, "points") for role, p in inputs.items() if p is not None}
+    truth = None if baseline is None else datasets.read(baseline, "runs")
+    result = design.dataset(
+        parameters, case, method, points, store, baseline=truth, n_threads=threads
+    )
+    inputs = {**inputs, "baseline": baseline, **_profile(parameters)}
+    inputs = {role: path for role, path in inputs.items() if path is not None}
+    save(result, out, "design", parameters, inputs, case=case, method=method)
+
+
 @main.command()
 @click.argument("name", type=click.Choice(list(FIGURES)))
 @click.argument("data", type=_File, nargs=-1, required=True)

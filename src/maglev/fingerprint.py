@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import hashlib
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parent
@@ -20,19 +21,26 @@ def _file(module: str) -> Path | None:
     return None
 
 
+@cache
+def _read(text: str) -> tuple[tuple[str, ...], str]:
+    """Names that a module may import, and its syntax tree without docstrings as a text."""
+    tree = ast.parse(text)
+    names: list[str] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            names += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return tuple(names), ast.dump(_without_docstrings(tree))
+
+
 def _imports(module: str) -> Iterator[str]:
     """Modules of the package that a module imports, wherever in it the import stands."""
     path = _file(module)
     if path is None:
         raise ValueError(f"there is no module {module}")
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-        else:
-            continue
-        yield from (n for n in names if n.split(".")[0] == _NAME and _file(n) is not None)
+    names, _ = _read(path.read_text(encoding="utf-8"))
+    yield from (n for n in names if n.split(".")[0] == _NAME and _file(n) is not None)
 
 
 def standing_on(*modules: str) -> tuple[str, ...]:
@@ -94,6 +102,6 @@ def code_of(*modules: str) -> str:
     for name in standing_on(*modules):
         path = _file(name)
         assert path is not None  # standing_on has found it
-        tree = _without_docstrings(ast.parse(path.read_text(encoding="utf-8")))
-        digest.update(f"{name}\n{ast.dump(tree)}\n".encode())
+        _, tree = _read(path.read_text(encoding="utf-8"))
+        digest.update(f"{name}\n{tree}\n".encode())
     return digest.hexdigest()[:16]

@@ -2,6 +2,20 @@
 # the file with its part, which is rewritten only when one of its values changes.
 
 
+import re
+
+
+def stages(needs: str, lacks: str) -> str:
+    """Pattern of the stages that read something of a case or a method, and nothing of another."""
+    found = (
+        re.escape(stage)
+        for stage, sections in SECTIONS.items()
+        if any(needs in one for one in sections)
+        and not any(lacks in one for one in sections)
+    )
+    return "|".join(found)
+
+
 rule run_config:
     output:
         "<results>/run_config.yaml",
@@ -23,7 +37,7 @@ rule stage_config:
     log:
         "<logs>/config/{stage}.log",
     wildcard_constraints:
-        stage="|".join(SECTIONS),
+        stage=stages(needs="", lacks="{case}"),
     conda:
         "../envs/maglev.yaml"
     params:
@@ -32,5 +46,45 @@ rule stage_config:
         ),
     message:
         "Write what the stage '{wildcards.stage}' reads of the configuration"
+    shell:
+        "printf %s {params.text:q} > {output} 2> {log}"
+
+
+rule case_config:
+    output:
+        "<results>/{case}/config/{stage}.yaml",
+    log:
+        "<logs>/{case}/config/{stage}.log",
+    wildcard_constraints:
+        stage=stages(needs="{case}", lacks="{method}"),
+    conda:
+        "../envs/maglev.yaml"
+    params:
+        text=lambda wildcards: config_text(
+            config_slice(config, wildcards.stage, wildcards.case),
+            f"results/{config['run']}/{wildcards.case}/config",
+        ),
+    message:
+        "Write what the stage '{wildcards.stage}' of '{wildcards.case}' reads"
+    shell:
+        "printf %s {params.text:q} > {output} 2> {log}"
+
+
+rule method_config:
+    output:
+        "<results>/{case}/{method}/config/{stage}.yaml",
+    log:
+        "<logs>/{case}/{method}/config/{stage}.log",
+    wildcard_constraints:
+        stage=stages(needs="{case}", lacks="-"),
+    conda:
+        "../envs/maglev.yaml"
+    params:
+        text=lambda wildcards: config_text(
+            config_slice(config, wildcards.stage, wildcards.case, wildcards.method),
+            f"results/{config['run']}/{wildcards.case}/{wildcards.method}/config",
+        ),
+    message:
+        "Write what the stage '{wildcards.stage}' of '{wildcards.case}', {wildcards.method}, reads"
     shell:
         "printf %s {params.text:q} > {output} 2> {log}"

@@ -55,6 +55,7 @@ SECTIONS: Mapping[str, tuple[str, ...]] = {
     },
     "points.candidates_asm": (*_RANDOM_GAINS, "study.asm"),
     "runs": _RUNS_OF_CASE,
+    "runs.track": (*_RUNS_OF_CASE, *_N_SAMPLES),
     "design": (*_RUNS_OF_CASE, "study.failure_probability", "study.{method}"),
 }
 """What each stage reads of the configuration: a change elsewhere leaves its file as it is.

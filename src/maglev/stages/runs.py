@@ -13,7 +13,7 @@ import json
 import logging
 import time
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import netCDF4
@@ -67,7 +67,7 @@ def _row_keys(gains: npt.NDArray[np.float64], seeds: npt.NDArray[np.int64] | Non
     return [key + seed.tobytes() for key, seed in zip(keys, seeds.astype("<i8"), strict=True)]
 
 
-@lru_cache(maxsize=None)
+@cache
 def _keys_in(path: Path) -> tuple[bytes, ...]:
     """What the runs of one file are found by; a file of the store never changes."""
     with netCDF4.Dataset(path) as file:
