@@ -1,13 +1,16 @@
 """Configurations: units in, one sentence out, and the files that are written from the classes."""
 
+import subprocess
+import sys
 from pathlib import Path
 
+import pint
 import pytest
 import yaml
 from jsonschema import Draft202012Validator
 from numpy.testing import assert_allclose
 
-from maglev import ConfigError, catalogue, load_config
+from maglev import ConfigError, catalogue, load_config, parameters
 from maglev.config import config_text, from_mapping, overlay
 from maglev.measurements import load_measurements
 from maglev.parameters import Config
@@ -149,6 +152,18 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path, text, sentence):
 def test_a_speed_may_be_given_in_any_unit_of_speed():
     assert_allclose(from_mapping({"passage": {"speed": "120 m/s"}}).passage.speed, 120)
     assert_allclose(from_mapping({"passage": {"speed": "432 km/h"}}).passage.speed, 120)
+
+
+@pytest.mark.parametrize(("unit", "si"), parameters._FACTORS)
+def test_the_short_cut_for_common_units_agrees_with_the_library(unit, si):
+    times, over = parameters._FACTORS[unit, si]
+    exact = pint.UnitRegistry().Quantity(430.0, unit).to(si).magnitude
+    assert_allclose(430.0 * times / over, exact, rtol=1e-15)
+
+
+def test_a_configuration_in_si_units_needs_no_library_of_units():
+    code = "import sys, maglev.parameters as p; p.Config(); sys.exit('pint' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_a_key_left_out_keeps_the_default_of_its_own_place():

@@ -14,10 +14,12 @@ import tokenize
 from collections.abc import Mapping
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-import pint
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+if TYPE_CHECKING:
+    import pint
 
 GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
 
@@ -41,6 +43,8 @@ CONFIDENCE = {"H": "high", "M": "medium", "L": "low"}
 
 @lru_cache(maxsize=1)
 def _units() -> pint.UnitRegistry:
+    import pint  # half a second, spared where every unit is an SI unit already
+
     return pint.UnitRegistry()
 
 
@@ -100,15 +104,21 @@ _QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?)\s*"
     r"(?P<unit>(?![eE][-+]?\d)[^\W\d].*?)\s*"
 )
-_UNREADABLE = (  # what pint raises for a unit that it cannot read
-    pint.errors.PintError,
-    tokenize.TokenError,
-    ArithmeticError,
-    AssertionError,
-    SyntaxError,
-    TypeError,
-    ValueError,
-)
+_FACTORS = {
+    ("km/h", "m/s"): (1.0, 3.6),
+    ("mm", "m"): (1.0, 1000.0),
+    ("ms", "s"): (1.0, 1000.0),
+    ("kN", "N"): (1000.0, 1.0),
+}
+"""What a number in the first unit is multiplied with and divided by for the second."""
+
+
+def _unreadable() -> tuple[type[Exception], ...]:
+    """What pint raises for a unit that it cannot read."""
+    import pint
+
+    python = (ArithmeticError, AssertionError, SyntaxError, TypeError, ValueError)
+    return (pint.errors.PintError, tokenize.TokenError, *python)
 
 
 def _in_unit(text: str, unit: str, key: str) -> float:
@@ -118,9 +128,15 @@ def _in_unit(text: str, unit: str, key: str) -> float:
         raise ValueError(
             f"{key} must be a number with a unit of {unit}, such as '1.5 {unit}', got {text!r}"
         )
+    number = float(match["number"])
+    if match["unit"] == unit:
+        return number
+    if (match["unit"], unit) in _FACTORS:
+        times, over = _FACTORS[match["unit"], unit]
+        return number * times / over
     try:
-        value = _units().Quantity(float(match["number"]), match["unit"])
-    except _UNREADABLE as error:
+        value = _units().Quantity(number, match["unit"])
+    except _unreadable() as error:
         raise ValueError(
             f"{key} must be a number with a unit of {unit}, got {text!r}, whose unit is not known"
         ) from error
