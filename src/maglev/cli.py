@@ -164,16 +164,23 @@ def _profile(parameters: Any) -> dict[str, str]:
 @main.command()
 @_config
 @_case
-@click.option("--set", "name", required=True, help="Name of the point set.")
-@_out
-def points(configs: tuple[Path, ...], case: str, name: str, out: Path) -> None:
-    """Draw a point set of a case."""
+@click.option(
+    "--set",
+    "sets",
+    type=(str, _File),
+    multiple=True,
+    required=True,
+    help="Name of a point set and NetCDF file to write; may be given again.",
+)
+def points(configs: tuple[Path, ...], case: str, sets: tuple[tuple[str, Path], ...]) -> None:
+    """Draw point sets of a case."""
     from maglev.config import load_config
     from maglev.stages import points, save
 
     parameters = load_config(*configs)
-    result = points.dataset(parameters, case, name)
-    save(result, out, f"points.{name}", parameters, case=case)
+    for name, out in sets:
+        result = points.dataset(parameters, case, name)
+        save(result, out, f"points.{name}", parameters, case=case)
 
 
 @main.command()

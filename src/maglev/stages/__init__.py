@@ -49,11 +49,12 @@ SECTIONS: Mapping[str, tuple[str, ...]] = {
     ),
     "points.baseline": (*_RANDOM_GAINS, *_N_SAMPLES),
     "points.representative": (*_RANDOM_GAINS, "study.n_representative", "study.n_counting"),
-    **{
-        f"points.{name}": (*_RANDOM_GAINS, f"study.{name.split('_', 1)[-1]}", "study.n_counting")
-        for name in ("osm", "initial_asm_paper", "candidates_asm_paper", "initial_asm")
+    "points.osm": (*_RANDOM_GAINS, "study.osm", "study.n_counting"),
+    **{  # first design and candidates are drawn together
+        f"points.{name}{method}": (*_RANDOM_GAINS, f"study.{method}", "study.n_counting")
+        for name in ("", "initial_", "candidates_")
+        for method in ("asm_paper", "asm")
     },
-    "points.candidates_asm": (*_RANDOM_GAINS, "study.asm"),
     "runs": _RUNS_OF_CASE,
     "runs.track": (*_RUNS_OF_CASE, *_N_SAMPLES),
     "design": (*_RUNS_OF_CASE, "study.failure_probability", "study.{method}"),
