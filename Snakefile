@@ -47,6 +47,8 @@ include: "workflow/rules/track.smk"
 include: "workflow/rules/validation.smk"
 include: "workflow/rules/points.smk"
 include: "workflow/rules/runs.smk"
+include: "workflow/rules/cases.smk"
+include: "workflow/rules/statistics.smk"
 include: "workflow/rules/figures.smk"
 
 
@@ -60,8 +62,12 @@ rule all:
         rules.gaps.output,
         rules.modes.output,
         runs_of_all_cases(),
+        statistics_of_all_cases(),
 
 
 rule truth:
     input:
         [f"<results>/{case}/mcm.nc" for case in parameters.cases],
+        [f"<results>/{case}/mcm/density.nc" for case in parameters.cases],
+        [f"<results>/{case}/mcm/limits.nc" for case in parameters.cases],
+        rules.statistics_truth.output,

@@ -286,6 +286,289 @@ def design(
     save(result, out, "design", parameters, inputs, case=case, method=method)
 
 
+_method_name = click.Choice(["mcm", "osm", "asm_paper", "asm"])
+_method = click.option("--method", type=_method_name, required=True, help="Name of the method.")
+_design = click.option("--design", type=_File, required=True, help="File of the design stage.")
+_surrogate = click.option("--surrogate", type=_File, help="File of the surrogate stage.")
+
+
+@main.command()
+@_config
+@_case
+@_method
+@_design
+@_out
+def surrogate(configs: tuple[Path, ...], case: str, method: str, design: Path, out: Path) -> None:
+    """Fit the surrogate of a design and learn where its samples are lost."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import save, surrogate
+
+    parameters = load_config(*configs)
+    result = surrogate.dataset(parameters, method, datasets.read(design, "design"))
+    named = result.assign_attrs(case=case, method=method)
+    save(named, out, "surrogate", parameters, {"design": design})
+
+
+@main.command()
+@_config
+@_case
+@_method
+@_design
+@click.option("--surrogate", type=_File, required=True, help="File of the surrogate stage.")
+@click.option("--points", type=_File, required=True, help="Representative points.")
+@_out
+def eev(
+    configs: tuple[Path, ...],
+    case: str,
+    method: str,
+    design: Path,
+    surrogate: Path,
+    points: Path,
+    out: Path,
+) -> None:
+    """Predict the extremes at the representative points."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import eev, save
+
+    parameters = load_config(*configs)
+    inputs = {"design": design, "surrogate": surrogate, "points": points}
+    result = eev.dataset(parameters, *(datasets.read(p, role) for role, p in inputs.items()))
+    save(result.assign_attrs(case=case, method=method), out, "eev", parameters, inputs)
+
+
+@main.command()
+@_config
+@_case
+@_method
+@click.option("--runs", type=_File, help="Baseline, for the method mcm.")
+@click.option("--design", type=_File, help="File of the design stage, for the others.")
+@_surrogate
+@click.option("--eev", type=_File, help="File of the eev stage.")
+@_out
+def density(
+    configs: tuple[Path, ...],
+    case: str,
+    method: str,
+    runs: Path | None,
+    design: Path | None,
+    surrogate: Path | None,
+    eev: Path | None,
+    out: Path,
+) -> None:
+    """Find densities and exceedance, of a baseline or of predicted extremes."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import density, save
+
+    parameters = load_config(*configs)
+    inputs = _inputs(method, {"runs": runs}, {"design": design, "surrogate": surrogate, "eev": eev})
+    files = [datasets.read(path, role) for role, path in inputs.items()]
+    compute = density.of_baseline if method == "mcm" else density.of_surrogate
+    result = compute(parameters, *files)
+    save(result.assign_attrs(case=case, method=method), out, "density", parameters, inputs)
+
+
+@main.command()
+@_config
+@_case
+@_method
+@click.option("--runs", type=_File, help="Baseline, for the method mcm.")
+@click.option("--design", type=_File, help="File of the design stage, for the others.")
+@_surrogate
+@_out
+def limits(
+    configs: tuple[Path, ...],
+    case: str,
+    method: str,
+    runs: Path | None,
+    design: Path | None,
+    surrogate: Path | None,
+    out: Path,
+) -> None:
+    """Read limits off a baseline or off a surrogate, with intervals."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import limits, save
+
+    parameters = load_config(*configs)
+    inputs = _inputs(method, {"runs": runs}, {"design": design, "surrogate": surrogate})
+    files = [datasets.read(path, role) for role, path in inputs.items()]
+    compute = limits.of_baseline if method == "mcm" else limits.of_surrogate
+    result = compute(parameters, *files)
+    save(result.assign_attrs(case=case, method=method), out, "limits", parameters, inputs)
+
+
+def _inputs(
+    method: str, of_baseline: dict[str, Path | None], of_surrogate: dict[str, Path | None]
+) -> dict[str, Path]:
+    """The files that the method needs, all of them and no others."""
+    needed, others = (of_baseline, of_surrogate) if method == "mcm" else (of_surrogate, of_baseline)
+    missing = [role for role, path in needed.items() if path is None]
+    if missing:
+        raise click.UsageError(f"the method {method} needs --{missing[0]}")
+    unused = [role for role, path in others.items() if path is not None]
+    if unused:
+        raise click.UsageError(f"the method {method} has no use for --{unused[0]}")
+    return {role: path for role, path in needed.items() if path is not None}
+
+
+_of_method = (_method_name, _File)
+_designs = click.option(
+    "--design", "designs", type=_of_method, multiple=True, help="Method and file of its design."
+)
+
+
+@main.command()
+@_config
+@_case
+@click.option("--baseline", type=_File, required=True, help="Baseline of the case.")
+@_designs
+@_out
+def accuracy(
+    configs: tuple[Path, ...],
+    case: str,
+    baseline: Path,
+    designs: tuple[tuple[str, Path], ...],
+    out: Path,
+) -> None:
+    """Judge the methods of a case by its baseline, for growing numbers of runs."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import accuracy, save
+
+    parameters = load_config(*configs)
+    read = {method: datasets.read(path, "design") for method, path in designs}
+    result = accuracy.dataset(parameters, datasets.read(baseline, "runs"), read)
+    inputs = {"baseline": baseline, **{f"design_{method}": path for method, path in designs}}
+    save(result.assign_attrs(case=case), out, "accuracy", parameters, inputs)
+
+
+@main.command("track-split")
+@_config
+@_case
+@click.option("--baseline", type=_File, required=True, help="Runs with gains and track random.")
+@click.option(
+    "--part", "parts", type=(str, _File), multiple=True, help="Name and file of further runs."
+)
+@_out
+def track_split(
+    configs: tuple[Path, ...],
+    case: str,
+    baseline: Path,
+    parts: tuple[tuple[str, Path], ...],
+    out: Path,
+) -> None:
+    """Split what random gains and a random track contribute to the extremes."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import save, track_split
+
+    parameters = load_config(*configs)
+    read = {name: datasets.read(path, "runs") for name, path in parts}
+    result = track_split.dataset(parameters, datasets.read(baseline, "runs"), read)
+    inputs = {"baseline": baseline, **dict(parts)}
+    save(result.assign_attrs(case=case), out, "track_split", parameters, inputs)
+
+
+@main.command()
+@_config
+@_case
+@click.option(
+    "--limits", "files", type=_of_method, multiple=True, help="Method and file of its limits."
+)
+@click.option("--out", type=_File, required=True, help="File name without its ending.")
+def table1(
+    configs: tuple[Path, ...], case: str, files: tuple[tuple[str, Path], ...], out: Path
+) -> None:
+    """Put the limits of all methods of a case into a table: NetCDF, CSV and Markdown."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import save, table1, tables
+
+    parameters = load_config(*configs)
+    result = table1.dataset({method: datasets.read(path, "limits") for method, path in files})
+    named = datasets.describe(result.assign_attrs(case=case))
+    heading = f"Limits of the extremes, case '{case}'"
+    tables.write(
+        out, table1.rows(named), table1.text(named, heading), demonstration=parameters.demonstration
+    )
+    save(named, out.with_name(f"{out.name}.nc"), "table1", parameters, dict(files))
+
+
+@main.command("paper-and-ours")
+@_config
+@_case
+@click.option(
+    "--density", "densities", type=_of_method, multiple=True, help="Method and file of its density."
+)
+@_designs
+@click.option("--accuracy", type=_File, required=True, help="File of the accuracy stage.")
+@click.option("--out", type=_File, required=True, help="File name without its ending.")
+def paper_and_ours(
+    configs: tuple[Path, ...],
+    case: str,
+    densities: tuple[tuple[str, Path], ...],
+    designs: tuple[tuple[str, Path], ...],
+    accuracy: Path,
+    out: Path,
+) -> None:
+    """Set our numbers beside those that survive of the paper: NetCDF, CSV and Markdown."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import paper_and_ours, save, tables
+
+    parameters = load_config(*configs)
+    result = paper_and_ours.dataset(
+        {method: datasets.read(path, "density") for method, path in densities},
+        {method: datasets.read(path, "design") for method, path in designs},
+        datasets.read(accuracy, "accuracy"),
+    )
+    named = datasets.describe(result.assign_attrs(case=case))
+    heading = f"What survives of the paper, and ours, case '{case}'"
+    rows, text = paper_and_ours.rows(named), paper_and_ours.text(named, heading)
+    tables.write(out, rows, text, demonstration=parameters.demonstration)
+    inputs = {f"density_{method}": path for method, path in densities}
+    inputs |= {f"design_{method}": path for method, path in designs} | {"accuracy": accuracy}
+    save(named, out.with_name(f"{out.name}.nc"), "paper_and_ours", parameters, inputs)
+
+
+@main.command("statistics-check")
+@_config
+@click.option(
+    "--baseline", "baselines", type=(str, _File), multiple=True, help="Case and its baseline."
+)
+@click.option(
+    "--limits",
+    "files",
+    type=(str, _method_name, _File),
+    multiple=True,
+    help="Case, method and file of its limits.",
+)
+@_out
+def statistics_check(
+    configs: tuple[Path, ...],
+    baselines: tuple[tuple[str, Path], ...],
+    files: tuple[tuple[str, str, Path], ...],
+    out: Path,
+) -> None:
+    """Check halves of the baselines against each other and every method against its baseline."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import save, statistics_check
+
+    parameters = load_config(*configs)
+    result = statistics_check.dataset(
+        parameters,
+        {case: datasets.read(path, "runs") for case, path in baselines},
+        {(case, method): datasets.read(path, "limits") for case, method, path in files},
+    )
+    inputs = {f"baseline_{case}": path for case, path in baselines}
+    inputs |= {f"limits_{case}_{method}": path for case, method, path in files}
+    save(result, out, "statistics_check", parameters, inputs)
+
+
 @main.command()
 @click.argument("name", type=click.Choice(list(FIGURES)))
 @click.argument("data", type=_File, nargs=-1, required=True)

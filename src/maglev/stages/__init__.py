@@ -32,6 +32,9 @@ _RUNS_OF_CASE = (
 )
 _N_SAMPLES = ("study.mcm.n_samples", "cases.{case}.n_samples")
 
+_STATISTICS = ("demonstration", "seed", "study.confidence", "study.n_population")
+_SURROGATES = tuple(f"study.{method}.surrogate" for method in ("osm", "asm_paper", "asm"))
+
 SECTIONS: Mapping[str, tuple[str, ...]] = {
     "irregularity": ("demonstration", "seed", "train", "guideway", "irregularity", "passage"),
     "modes": ("demonstration", "guideway", "validation.measurements"),
@@ -58,6 +61,15 @@ SECTIONS: Mapping[str, tuple[str, ...]] = {
     "runs": _RUNS_OF_CASE,
     "runs.track": (*_RUNS_OF_CASE, *_N_SAMPLES),
     "design": (*_RUNS_OF_CASE, "study.failure_probability", "study.{method}"),
+    "surrogate": (*_STATISTICS, *_SURROGATES),
+    "eev": _STATISTICS,
+    "density": _STATISTICS,
+    "limits": (*_STATISTICS, "study.failure_probability"),
+    "accuracy": (*_STATISTICS, *_SURROGATES, "study.failure_probability"),
+    "track_split": ("demonstration", "seed", "study.confidence"),
+    "table1": ("demonstration",),
+    "paper_and_ours": ("demonstration",),
+    "statistics_check": ("demonstration", "study.confidence", "study.failure_probability"),
 }
 """What each stage reads of the configuration: a change elsewhere leaves its file as it is.
 

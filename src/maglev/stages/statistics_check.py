@@ -1,0 +1,216 @@
+"""Whether the statistics mean something: halves of a baseline, methods against it, losses."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from maglev.datasets import LIMIT_STATUS, METHODS, RESPONSES
+from maglev.parameters import Config
+from maglev.stages.density import binomial_interval
+from maglev.stages.extremes import extremes, lost
+from maglev.stages.limits import baseline_limits, status_numbers
+
+_LOG = logging.getLogger(__name__)
+
+HALVES, LIMIT, LOSS = range(3)
+"""Codes of ``check_kind``."""
+
+NO, YES, UNDECIDED = range(3)
+"""Codes of ``check_passed``."""
+
+_GIVEN, _, _INFINITE = range(len(LIMIT_STATUS))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """One check: what was found, and between which values it passes.
+
+    Parameters
+    ----------
+    kind
+        ``HALVES``, ``LIMIT`` or ``LOSS``.
+    case, method
+        What was checked.
+    response
+        Number of the response, or how many there are for none.
+    level
+        Failure probability, 0 for none [-].
+    value, low, high
+        What was found and the ends of what passes [-]; NaN where nothing can be said.
+    passed
+        ``NO``, ``YES`` or ``UNDECIDED``.
+    """
+
+    kind: int
+    case: str
+    method: str
+    response: int
+    level: float
+    value: float
+    low: float
+    high: float
+    passed: int
+
+
+def dataset(
+    config: Config,
+    baselines: Mapping[str, xr.Dataset],
+    limits: Mapping[tuple[str, str], xr.Dataset],
+) -> xr.Dataset:
+    """Check every case that has a baseline.
+
+    Three kinds: the limits of the baseline's two halves, their difference over the sum of those
+    parts of their intervals that face each other, which passes if the intervals meet; each
+    method's limit less the baseline's over half the interval of the latter, which passes within
+    one; each method's probability of loss, which passes within the binomial interval of the
+    baseline's count.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    baselines
+        Layout ``runs``, by case.
+    limits
+        Layout ``limits``, by case and method, of these cases.
+
+    Returns
+    -------
+    dataset
+        Layout ``statistics_check``.  A check that cannot be decided (a limit that the sample does
+        not carry) says so; one that fails is reported, not raised.
+
+    Raises
+    ------
+    ValueError
+        If there is no baseline, or a case has limits and no baseline.
+    """
+    if not baselines:
+        raise ValueError("the check of the statistics needs at least one baseline, got none")
+    strange = sorted({case for case, _ in limits} - set(baselines))
+    if strange:
+        raise ValueError(f"the case '{strange[0]}' has limits and no baseline; run its baseline")
+    checks: list[Check] = []
+    for case, runs in baselines.items():
+        checks += _halves(config, case, runs)
+        for (of_case, method), found in limits.items():
+            if of_case == case and method != "mcm":
+                checks += _against(config, case, method, runs, found)
+    for kind, words in enumerate(("halves agree", "limits agree", "losses agree")):
+        passed = [one.passed for one in checks if one.kind == kind]
+        _LOG.info(
+            "%s: %d yes, %d no, %d cannot be decided",
+            words,
+            *(passed.count(code) for code in (YES, NO, UNDECIDED)),
+        )
+    return _dataset(checks, list(baselines))
+
+
+def _halves(config: Config, case: str, runs: xr.Dataset) -> list[Check]:
+    """Limits of the first and the second half of a baseline."""
+    values, away = extremes(runs), lost(runs)
+    middle = away.size // 2
+    parts = [slice(0, middle), slice(middle, 2 * middle)]
+    if any(away[part].all() for part in parts):
+        raise ValueError(f"a half of the baseline of '{case}' has no run that held")
+    first, second = (baseline_limits(config, values[part], away[part]) for part in parts)
+    checks = []
+    for response, (a, b) in enumerate(zip(first, second, strict=True)):
+        codes = zip(status_numbers(a), status_numbers(b), strict=True)
+        for k, (level, code) in enumerate(zip(a.failure_probability, codes, strict=True)):
+            lower, upper = (a, b) if a.limit[k] <= b.limit[k] else (b, a)
+            facing = (upper.limit[k] - lower.limit[k], lower.upper[k] - lower.limit[k])
+            reach = facing[1] + upper.limit[k] - upper.lower[k]
+            value = _ratio(b.limit[k] - a.limit[k], reach)
+            checks.append(_judged(HALVES, case, "mcm", response, level, value, -1.0, 1.0, code))
+    return checks
+
+
+def _against(
+    config: Config, case: str, method: str, runs: xr.Dataset, found: xr.Dataset
+) -> list[Check]:
+    """Limits and losses of a method against those of the baseline."""
+    values, away = extremes(runs), lost(runs)
+    checks = []
+    for response, truth in enumerate(baseline_limits(config, values, away)):
+        codes = zip(status_numbers(truth), found["limit_status"].to_numpy()[response], strict=True)
+        for k, (level, code) in enumerate(zip(truth.failure_probability, codes, strict=True)):
+            difference = float(found["limit"][response, k]) - truth.limit[k]
+            value = _ratio(difference, 0.5 * (truth.upper[k] - truth.lower[k]))
+            checks.append(_judged(LIMIT, case, method, response, level, value, -1.0, 1.0, code))
+    low, high = binomial_interval(float(np.count_nonzero(away)), away.size, config.study.confidence)
+    value = float(found["lost_probability"])
+    none = (_GIVEN, _GIVEN)
+    checks.append(
+        _judged(LOSS, case, method, len(RESPONSES), 0.0, value, float(low), float(high), none)
+    )
+    return checks
+
+
+def _ratio(difference: float, reach: float) -> float:
+    """A difference in units of a reach: 0 in an unbounded one, NaN without one."""
+    if np.isnan(difference) or np.isnan(reach) or reach == 0.0:
+        return 0.0 if difference == 0.0 else np.nan
+    return float(difference / reach)
+
+
+def _judged(
+    kind: int,
+    case: str,
+    method: str,
+    response: int,
+    level: float,
+    value: float,
+    low: float,
+    high: float,
+    codes: tuple[int, int],
+) -> Check:
+    """A check with its verdict, from what can be said of the two limits that it compares."""
+    infinite = [code == _INFINITE for code in codes]
+    if all(infinite):
+        value, passed = 0.0, YES  # both say that no limit exists
+    elif any(infinite) and _GIVEN in codes:
+        value, passed = np.nan, NO
+    elif codes != (_GIVEN, _GIVEN) or np.isnan(value):
+        value, passed = np.nan, UNDECIDED
+    else:
+        passed = YES if low <= value <= high else NO
+    return Check(
+        kind=kind,
+        case=case,
+        method=method,
+        response=response,
+        level=float(level),
+        value=value,
+        low=low,
+        high=high,
+        passed=passed,
+    )
+
+
+def _dataset(checks: list[Check], cases: list[str]) -> xr.Dataset:
+    columns = {
+        "check_kind": [one.kind for one in checks],
+        "check_case": [cases.index(one.case) for one in checks],
+        "check_method": [METHODS.index(one.method) for one in checks],
+        "check_response": [one.response for one in checks],
+        "check_failure_probability": [one.level for one in checks],
+        "check_value": [one.value for one in checks],
+        "check_low": [one.low for one in checks],
+        "check_high": [one.high for one in checks],
+        "check_passed": [one.passed for one in checks],
+    }
+    result = xr.Dataset(
+        {name: (("check",), np.array(column)) for name, column in columns.items()},
+        coords={"check": np.arange(len(checks))},
+    )
+    result["check_case"].attrs = {
+        "flag_values": np.arange(len(cases), dtype="int32"),
+        "flag_meanings": " ".join(cases),
+    }
+    return result

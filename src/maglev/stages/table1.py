@@ -1,0 +1,137 @@
+"""Table 1: limits of the six responses at the failure probabilities, by every method of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from maglev.datasets import LIMIT_STATUS, METHODS, RESPONSE_UNITS, RESPONSES
+from maglev.stages.extremes import coordinates, method_number
+from maglev.stages.tables import markdown, number
+
+_OF_METHOD = ("limit", "limit_low", "limit_high", "limit_status")
+_LOST = ("lost_probability", "lost_probability_low", "lost_probability_high")
+
+
+def dataset(limits: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Put the limits of the methods of one case side by side.
+
+    Parameters
+    ----------
+    limits
+        Layout ``limits``, by method.
+
+    Returns
+    -------
+    dataset
+        Layout ``table1``.
+
+    Raises
+    ------
+    ValueError
+        If there is no method, or their failure probabilities differ.
+    """
+    if not limits:
+        raise ValueError("table 1 needs the limits of at least one method, got none")
+    names = sorted(limits, key=METHODS.index)
+    levels = limits[names[0]]["failure_probability"].to_numpy()
+    for name in names[1:]:
+        others = limits[name]["failure_probability"].to_numpy()
+        if not np.array_equal(others, levels):
+            raise ValueError(
+                f"limits of '{names[0]}' and '{name}' must be at the same failure probabilities, "
+                f"got {levels} and {others}; compute them again"
+            )
+    dims = ("method", "response", "failure_probability")
+    variables = {
+        f"table_{name}": (dims, np.stack([limits[one][name].to_numpy() for one in names]))
+        for name in _OF_METHOD
+    }
+    variables |= {
+        f"table_{name}": (dims[:1], np.array([float(limits[one][name]) for one in names]))
+        for name in _LOST
+    }
+    variables["table_n_runs"] = (dims[:1], [int(limits[one]["n_runs"]) for one in names])
+    result = xr.Dataset(
+        variables,
+        coords=coordinates(
+            method=np.array([method_number(name) for name in names]), failure_probability=levels
+        ),
+    )
+    for name in ("limit", "lost_probability"):
+        said = {one: limits[one][name].attrs.get("comment", "") for one in names}
+        result[f"table_{name}"].attrs["comment"] = "; ".join(
+            f"{one}: {text}" for one, text in said.items() if text
+        )
+    return result
+
+
+def rows(table: xr.Dataset) -> list[dict[str, object]]:
+    """The table as rows of a CSV file: one per response, failure probability and method."""
+    found: list[dict[str, object]] = []
+    for r, response in enumerate(RESPONSES):
+        for p, level in enumerate(table["failure_probability"].to_numpy()):
+            for m, code in enumerate(table["method"].to_numpy()):
+                at = {"response": r, "failure_probability": p, "method": m}
+                one = table.isel(at)
+                found.append(
+                    {
+                        "response": response,
+                        "unit": RESPONSE_UNITS[response],
+                        "failure_probability": float(level),
+                        "method": METHODS[code],
+                        "n_runs": int(one["table_n_runs"]),
+                        "limit": float(one["table_limit"]),
+                        "limit_low": float(one["table_limit_low"]),
+                        "limit_high": float(one["table_limit_high"]),
+                        "status": LIMIT_STATUS[int(one["table_limit_status"])],
+                    }
+                )
+    return found
+
+
+def text(table: xr.Dataset, heading: str) -> str:
+    """The table in Markdown: a row per response and failure probability, a column per method."""
+    codes = table["method"].to_numpy()
+    header = [
+        "response",
+        "failure probability",
+        *(
+            f"{METHODS[code]}, {int(n)} runs"
+            for code, n in zip(codes, table["table_n_runs"], strict=True)
+        ),
+    ]
+    by_place = {
+        (row["response"], row["failure_probability"], row["method"]): row for row in rows(table)
+    }
+    body = []
+    for response in RESPONSES:
+        for level in table["failure_probability"].to_numpy():
+            cells = [by_place[response, float(level), METHODS[code]] for code in codes]
+            body.append(
+                [f"{response} [{RESPONSE_UNITS[response]}]", f"{level:g}", *map(_cell, cells)]
+            )
+    lost = [
+        f"{float(p):.2g} [{float(low):.2g}, {float(high):.2g}]"
+        for p, low, high in zip(*(table[f"table_{name}"] for name in _LOST), strict=True)
+    ]
+    body.append(["levitation lost", "", *lost])
+    notes = [table[f"table_{name}"].attrs["comment"] for name in ("limit", "lost_probability")]
+    return (
+        f"# {heading}\n\nLimit [lower, upper end of its interval].\n\n{markdown(header, body)}\n"
+        f"Limits: {notes[0]}.\n\nLost levitation: {notes[1]}.\n"
+    )
+
+
+def _cell(row: Mapping[str, object]) -> str:
+    if row["status"] == "infinite":
+        return (
+            f"none: losses are likelier (above {number(row['limit_low'])})"
+            if np.isfinite(float(str(row["limit_low"])))
+            else "none: losses are likelier"
+        )
+    if row["status"] != "given":
+        return str(row["status"]).replace("_", " ")
+    return f"{number(row['limit'])} [{number(row['limit_low'])}, {number(row['limit_high'])}]"

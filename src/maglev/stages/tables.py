@@ -1,0 +1,71 @@
+"""Tables as text: CSV and Markdown, written whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+
+def number(value: Any) -> str:
+    """A number with five digits, or a word for one that is none."""
+    value = float(value)
+    return "–" if value != value else f"{value:.5g}"
+
+
+def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown, ending with a line break."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
+    """Rows with common keys as CSV; numbers in full precision."""
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return stream.getvalue()
+
+
+def write(
+    stem: str | Path,
+    rows: Sequence[Mapping[str, object]],
+    text: str,
+    *,
+    demonstration: bool,
+) -> None:
+    """Write a table as CSV and Markdown, both marked where it is no result.
+
+    Parameters
+    ----------
+    stem
+        File name without its ending.
+    rows
+        Rows of the CSV file, by column.
+    text
+        The Markdown.
+    demonstration
+        Whether to mark both as a demonstration.
+    """
+    stem = Path(stem)
+    if demonstration:
+        rows = [{**row, "demonstration": "yes"} for row in rows]
+        text = f"*Demonstration, not a result.*\n\n{text}"
+    write_text(stem.with_name(f"{stem.name}.csv"), csv_text(rows))
+    write_text(stem.with_name(f"{stem.name}.md"), text)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text aside and rename it into place."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        aside.write_text(text, encoding="utf-8")
+        os.replace(aside, path)
+    finally:
+        aside.unlink(missing_ok=True)
