@@ -51,11 +51,11 @@ class MagnetRows(NamedTuple):
 
 
 class Line(NamedTuple):
-    """Guideway in component coordinates."""
+    """Guideway in component coordinates: modes of spans, modes of piers, pier tops."""
 
     n_spans: int
     span_length: float
-    stride: int  # rows of rail coefficients a span, a multiple of 4
+    stride: int  # rows of rail coefficients a span, even
     upright_start: np.ndarray  # (span + 1,)
     upright_felt: np.ndarray  # (span,) end of those slow enough for a magnet to feel
     upright: np.ndarray  # coordinates that move a span's rails up and down
@@ -63,8 +63,7 @@ class Line(NamedTuple):
     sideways_felt: np.ndarray  # (span,)
     sideways: np.ndarray  # coordinates that roll a span or move it sideways
     rail_z: np.ndarray  # (upright, stride)
-    rail_roll: np.ndarray  # (sideways, stride)
-    rail_y: np.ndarray  # (sideways, stride)
+    rail_side: np.ndarray  # (sideways, 2 stride) roll, then y
     n_modes: int
     row_start: np.ndarray  # (coordinate + 1,) stiffness
     column: np.ndarray
@@ -89,8 +88,8 @@ class Places(NamedTuple):
     base: np.ndarray  # (place,) first of four rail coefficients, -1 off the guideway
     weight: np.ndarray  # (place, 4) of the coefficients in the rail's motion at the pole
     rise: np.ndarray  # (place, 4) of the coefficients in the rate of its motion at the pole [1/s]
-    rail: np.ndarray  # (place, side) irregularity [m]
-    ramp: np.ndarray  # (place, side) its rate at the pole [m/s]
+    rail: np.ndarray  # (place, side, 1 or LANES) irregularity of all samples, or of each [m]
+    ramp: np.ndarray  # (place, side, 1 or LANES) its rate at the pole [m/s]
 
 
 class Run(NamedTuple):
@@ -122,36 +121,43 @@ class Outcome(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _transform(matrix, columns, start, stop, source, first, target):
-    """``target[first + k] = Σ_m matrix[m, k] source[columns[m]]``, four rows at once."""
-    for k in range(0, matrix.shape[1], 4):
-        a = load(source, 0) * 0.0
-        b, c, d = a, a, a
-        for m in range(start, stop):
-            s = load(source, columns[m])
-            a = fma(s, matrix[m, k], a)
-            b = fma(s, matrix[m, k + 1], b)
-            c = fma(s, matrix[m, k + 2], c)
-            d = fma(s, matrix[m, k + 3], d)
+def _gather(source, columns, start, stop, packed):
+    """``packed[m] = source[columns[start + m]]``: the product reads rows that follow each other."""
+    for m in range(start, stop):
+        store(packed, m - start, load(source, columns[m]))
+
+
+@njit(cache=True, error_model="numpy")
+def _transform(matrix, start, stop, packed, target, first):
+    """``target[first + k] = Σ_m matrix[start + m, k] packed[m]``; two rows fill the registers."""
+    for k in range(0, matrix.shape[1], 2):
+        a = load(packed, 0) * 0.0
+        b = a
+        for m in range(stop - start):
+            one = load(packed, m)
+            a = fma(one, matrix[start + m, k], a)
+            b = fma(one, matrix[start + m, k + 1], b)
         store(target, first + k, a)
         store(target, first + k + 1, b)
-        store(target, first + k + 2, c)
-        store(target, first + k + 3, d)
 
 
 @njit(cache=True, error_model="numpy")
 def _project(matrix, columns, start, stop, source, first, target):
-    """``target[columns[m]] += Σ_k matrix[m, k] source[first + k]``."""
-    for m in range(start, stop):
+    """``target[columns[m]] += Σ_k matrix[m, k] source[first + k]``, two rows at once."""
+    for m in range(start, stop - 1, 2):
         a = load(target, columns[m])
-        b = a * 0.0
-        c, d = b, b
-        for k in range(0, matrix.shape[1], 4):
-            a = fma(load(source, first + k), matrix[m, k], a)
-            b = fma(load(source, first + k + 1), matrix[m, k + 1], b)
-            c = fma(load(source, first + k + 2), matrix[m, k + 2], c)
-            d = fma(load(source, first + k + 3), matrix[m, k + 3], d)
-        store(target, columns[m], (a + b) + (c + d))
+        b = load(target, columns[m + 1])
+        for k in range(matrix.shape[1]):
+            one = load(source, first + k)
+            a = fma(one, matrix[m, k], a)
+            b = fma(one, matrix[m + 1, k], b)
+        store(target, columns[m], a)
+        store(target, columns[m + 1], b)
+    if (stop - start) % 2 == 1:
+        a = load(target, columns[stop - 1])
+        for k in range(matrix.shape[1]):
+            a = fma(load(source, first + k), matrix[stop - 1, k], a)
+        store(target, columns[stop - 1], a)
 
 
 @njit(cache=True, error_model="numpy")
@@ -166,6 +172,7 @@ def _magnets(
     rail_motion,
     rail_velocity,
     rail_force,
+    keep,
     outcome,
     magnet_min,
     magnet_max,
@@ -181,6 +188,7 @@ def _magnets(
         places.ramp,
     )
     n_poles = rows.offset.size
+    own_track = rail.shape[2] > 1
     kind = 1 if rows.is_guidance else 0
     proportional = load(gains, 2 * kind)
     derivative = load(gains, 2 * kind + 1)
@@ -211,8 +219,14 @@ def _magnets(
             current_sum = total
             for p in range(n_poles):
                 here = places.number[row, p] + step
-                error = fma(turn, rows.arm[p], shift) - sign * rail[here, side]
-                rate = fma(turn_velocity, rows.arm[p], shift_velocity) - sign * ramp[here, side]
+                error = fma(turn, rows.arm[p], shift)
+                rate = fma(turn_velocity, rows.arm[p], shift_velocity)
+                if own_track:
+                    error = fma(load(rail, 2 * here + side), -sign, error)
+                    rate = fma(load(ramp, 2 * here + side), -sign, rate)
+                else:
+                    error = error - sign * rail[here, side, 0]
+                    rate = rate - sign * ramp[here, side, 0]
                 k = base[here]
                 if k >= 0:
                     for j in range(4):
@@ -237,8 +251,9 @@ def _magnets(
                 smallest = minimum(smallest, gap)
                 largest = maximum(largest, gap)
                 strongest = maximum(strongest, current)
-                gap_sum = gap_sum + gap
-                current_sum = current_sum + current
+                if keep:
+                    gap_sum = gap_sum + gap
+                    current_sum = current_sum + current
             static_moment = rows.static_moment[row, side]
             store(
                 force,
@@ -249,8 +264,9 @@ def _magnets(
             number = rows.number[row, side]
             store(magnet_min, number, smallest)
             store(magnet_max, number, largest)
-            store(magnet_gap, number, gap_sum * (1.0 / n_poles))
-            store(magnet_current, number, current_sum * (1.0 / n_poles))
+            if keep:
+                store(magnet_gap, number, gap_sum * (1.0 / n_poles))
+                store(magnet_current, number, current_sum * (1.0 / n_poles))
             least = minimum(least, smallest)
             most = maximum(most, largest)
     store(outcome.gap_min, kind, least)
@@ -279,37 +295,43 @@ def _line_acceleration(line, x, velocity, relative, force):
     """Turn the forces on the guideway's coordinates into accelerations, in place."""
     n, n_modes = x.shape[0], line.n_modes
     for i in range(n):
-        store(relative, i, load(velocity, i))
-    for i in range(n_modes):
         rate = load(velocity, i)
-        for k in range(line.carried_start[i], line.carried_start[i + 1]):
-            rate = fma(load(velocity, line.carried_column[k]), -line.carried[k], rate)
+        if i < n_modes:
+            for k in range(line.carried_start[i], line.carried_start[i + 1]):
+                rate = fma(load(velocity, line.carried_column[k]), -line.carried[k], rate)
         store(relative, i, rate)
     for i in range(n):
         total = load(force, i)
         for k in range(line.row_start[i], line.row_start[i + 1]):
             total = fma(load(x, line.column[k]), -line.stiffness[k], total)
         drag = total * 0.0
-        for k in range(line.damping_start[i], line.damping_start[i + 1]):
+        more = drag
+        start, stop = line.damping_start[i], line.damping_start[i + 1]
+        for k in range(start, stop - 1, 2):  # two sums: neither waits for the other
             drag = fma(load(relative, line.damping_column[k]), -line.damping[k], drag)
+            at = line.damping_column[k + 1]
+            more = fma(load(relative, at), -line.damping[k + 1], more)
+        if (stop - start) % 2 == 1:
+            at = line.damping_column[stop - 1]
+            drag = fma(load(relative, at), -line.damping[stop - 1], drag)
+        drag = drag + more
         store(force, i, (total + drag) * line.response[i])
         if i < n_modes:
             for k in range(line.carried_start[i], line.carried_start[i + 1]):
                 top = line.carried_column[k]
                 store(force, top, fma(drag, -line.carried[k], load(force, top)))
     band = line.top_factor.shape[1]
-    first = line.n_modes
-    n_top = n - first
+    n_top = n - n_modes
     for i in range(n_top):
-        total = load(force, first + i)
+        total = load(force, n_modes + i)
         for k in range(1, min(band, i + 1)):
-            total = total - load(force, first + i - k) * line.top_factor[i, k]
-        store(force, first + i, total * line.top_factor[i, 0])
+            total = fma(load(force, n_modes + i - k), -line.top_factor[i, k], total)
+        store(force, n_modes + i, total * line.top_factor[i, 0])
     for i in range(n_top - 1, -1, -1):
-        total = load(force, first + i)
+        total = load(force, n_modes + i)
         for k in range(1, min(band, n_top - i)):
-            total = total - load(force, first + i + k) * line.top_factor[i + k, k]
-        store(force, first + i, total * line.top_factor[i, 0])
+            total = fma(load(force, n_modes + i + k), -line.top_factor[i + k, k], total)
+        store(force, n_modes + i, total * line.top_factor[i, 0])
 
 
 @njit(cache=True, error_model="numpy")
@@ -368,16 +390,18 @@ def passage(
     dt = run.time_step
     half, half_square = 0.5 * dt, 0.5 * dt * dt
     x = np.zeros((n_dof, LANES))
-    velocity = np.zeros((n_dof, LANES))  # after the half kick
+    velocity = np.zeros((n_dof, LANES))  # at the middle of the step
     predicted = np.zeros((n_dof, LANES))
-    acceleration = np.zeros((n_dof, LANES))
+    force = np.zeros((n_dof, LANES))
     line_x = np.zeros((n_line, LANES))
     line_velocity = np.zeros((n_line, LANES))
     line_predicted = np.zeros((n_line, LANES))
     line_acceleration = np.zeros((n_line, LANES))
     line_relative = np.zeros((n_line, LANES))
-    n_rail = line.n_spans * line.stride
-    roll = np.zeros((line.stride, LANES))
+    stride = line.stride
+    n_rail = line.n_spans * stride
+    packed = np.zeros((max(line.upright.size, line.sideways.size), LANES))
+    side = np.zeros((2 * stride, LANES))
     rail_motion = np.zeros((3, n_rail, LANES))  # right z, left z, y
     rail_velocity = np.zeros((3, n_rail, LANES))
     rail_force = np.zeros((3, n_rail, LANES))
@@ -390,14 +414,18 @@ def passage(
     for step in range(1, run.n_steps + 1):
         time = step * dt
         nose = run.start + run.speed * time
+        record = run.record_every > 0 and step % run.record_every == 0
         for i in range(n_dof):
-            a, v = load(acceleration, i), load(velocity, i)
+            a = load(force, i) * vehicle.inverse_mass[i]
+            v = fma(a, half, load(velocity, i))  # closes the last step
             store(x, i, fma(a, half_square, fma(v, dt, load(x, i))))
             store(predicted, i, fma(a, dt, v))
             store(velocity, i, fma(a, half, v))
-            store(acceleration, i, a * 0.0)
-        for i in range(n_line):
-            a, v = load(line_acceleration, i), load(line_velocity, i)
+            store(force, i, a * 0.0)
+        reached = nose >= 0.0  # until then the guideway rests
+        for i in range(n_line if reached else 0):
+            a = load(line_acceleration, i)
+            v = fma(a, half, load(line_velocity, i))
             store(line_x, i, fma(a, half_square, fma(v, dt, load(line_x, i))))
             store(line_predicted, i, fma(a, dt, v))
             store(line_velocity, i, fma(a, half, v))
@@ -405,50 +433,48 @@ def passage(
         first = max(0, int(np.floor((nose - run.train_length) / line.span_length)))
         last = min(line.n_spans - 1, int(np.floor(nose / line.span_length)))
         for span in range(first, last + 1):
-            at = span * line.stride
+            at = span * stride
             up, up_felt = line.upright_start[span], line.upright_felt[span]
             out, out_felt = line.sideways_start[span], line.sideways_felt[span]
             for quantity in range(2):
                 source = line_x if quantity == 0 else line_predicted
                 target = rail_motion if quantity == 0 else rail_velocity
-                _transform(line.rail_z, line.upright, up, up_felt, source, at, target[0])
-                _transform(line.rail_roll, line.sideways, out, out_felt, source, 0, roll)
-                _transform(line.rail_y, line.sideways, out, out_felt, source, at, target[2])
-                for k in range(line.stride):
-                    mean, turn = load(target[0], at + k), load(roll, k)
+                _gather(source, line.upright, up, up_felt, packed)
+                _transform(line.rail_z, up, up_felt, packed, target[0], at)
+                _gather(source, line.sideways, out, out_felt, packed)
+                _transform(line.rail_side, out, out_felt, packed, side, 0)
+                for k in range(stride):
+                    mean, turn = load(target[0], at + k), load(side, k)
                     store(target[0], at + k, mean + turn)
                     store(target[1], at + k, mean - turn)
-            for side in range(3):
-                for k in range(line.stride):
-                    store(rail_force[side], at + k, load(roll, k) * 0.0)
-        _links(vehicle, x, predicted, acceleration)
+                    store(target[2], at + k, load(side, stride + k))
+            for field in range(3):
+                for k in range(stride):
+                    store(rail_force[field], at + k, load(side, 0) * 0.0)
+        _links(vehicle, x, predicted, force)
         _magnets(
-            suspension_places, suspension, step, gains, x, predicted, acceleration, rail_motion,
-            rail_velocity, rail_force, outcome, magnet_min, magnet_max, magnet_gap, magnet_current,
+            suspension_places, suspension, step, gains, x, predicted, force, rail_motion,
+            rail_velocity, rail_force, record, outcome, magnet_min, magnet_max, magnet_gap,
+            magnet_current,
         )  # fmt: skip
         _magnets(
-            guidance_places, guidance, step, gains, x, predicted, acceleration, rail_motion,
-            rail_velocity, rail_force, outcome, magnet_min, magnet_max, magnet_gap, magnet_current,
+            guidance_places, guidance, step, gains, x, predicted, force, rail_motion,
+            rail_velocity, rail_force, record, outcome, magnet_min, magnet_max, magnet_gap,
+            magnet_current,
         )  # fmt: skip
         for span in range(first, last + 1):
-            at = span * line.stride
+            at = span * stride
             up, up_end = line.upright_start[span], line.upright_start[span + 1]
             out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
-            for k in range(line.stride):
-                right, left = load(rail_force[0], at + k), load(rail_force[1], at + k)
-                store(rail_force[0], at + k, right + left)
-                store(roll, k, right - left)
+            for k in range(stride):
+                right, left_one = load(rail_force[0], at + k), load(rail_force[1], at + k)
+                store(rail_force[0], at + k, right + left_one)
+                store(side, k, right - left_one)
+                store(side, stride + k, load(rail_force[2], at + k))
             _project(line.rail_z, line.upright, up, up_end, rail_force[0], at, line_acceleration)
-            _project(line.rail_roll, line.sideways, out, out_end, roll, 0, line_acceleration)
-            _project(line.rail_y, line.sideways, out, out_end, rail_force[2], at, line_acceleration)
-        _line_acceleration(line, line_x, line_predicted, line_relative, line_acceleration)
-        for i in range(n_dof):
-            a = load(acceleration, i) * vehicle.inverse_mass[i]
-            store(acceleration, i, a)
-            store(velocity, i, fma(a, half, load(velocity, i)))
-        for i in range(n_line):
-            store(line_velocity, i, fma(load(line_acceleration, i), half, load(line_velocity, i)))
-        record = run.record_every > 0 and step % run.record_every == 0
+            _project(line.rail_side, line.sideways, out, out_end, side, 0, line_acceleration)
+        if reached:
+            _line_acceleration(line, line_x, line_predicted, line_relative, line_acceleration)
         row = step // run.record_every - 1 if record else 0
         for direction in range(2):
             shift = load(line_x, 0) * 0.0
@@ -473,8 +499,9 @@ def passage(
                 store(outcome.history[row], direction, shift)
                 store(outcome.history[row], 2 + direction, smooth)
         for car in range(n_cars):
-            up = load(acceleration, vehicle.body_z[car])
-            across = load(acceleration, vehicle.body_y[car])
+            vertical, lateral = vehicle.body_z[car], vehicle.body_y[car]
+            up = load(force, vertical) * vehicle.inverse_mass[vertical]
+            across = load(force, lateral) * vehicle.inverse_mass[lateral]
             _keep_extreme(outcome, 4 + car, up, time)
             _keep_extreme(outcome, 4 + n_cars + car, across, time)
             if record:

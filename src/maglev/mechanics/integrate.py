@@ -345,9 +345,9 @@ def _magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows
 
 
 def _stride(guideway: Guideway) -> int:
-    """Rows of rail coefficients a span, rounded up to what the kernels do at once."""
+    """Rows of rail coefficients a span."""
     rail = guideway.rail
-    return -(-rail.units_per_span * 2 * (rail.connectors_per_unit + 2) // 4) * 4
+    return rail.units_per_span * 2 * (rail.connectors_per_unit + 2)
 
 
 def _places(
@@ -383,8 +383,8 @@ def _places(
         base=np.where(on, span * _stride(config.guideway) + first_coefficient, -1),
         weight=np.where(on[:, None], weight, 0.0),
         rise=np.where(on[:, None], slope * speed, 0.0),
-        rail=np.ascontiguousarray(value[kind].T) + sag[:, None] * apart,
-        ramp=(np.ascontiguousarray(ramp[kind].T) + sag_slope[:, None] * apart) * speed,
+        rail=(value[kind].T + sag[:, None] * apart)[..., None],
+        ramp=((ramp[kind].T + sag_slope[:, None] * apart) * speed)[..., None],
     )
 
 
@@ -416,8 +416,6 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
     columns = reduced.span_coordinates
     omega = np.zeros(reduced.n_coordinates)  # pier tops first
     omega[: reduced.n_modes] = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes])
-    n_coefficients = reduced.rail_z[0].shape[1]
-    stride = _stride(reduced.parameters)
     least = 1e-9 * max(np.abs(z).max() for z in reduced.rail_z)
 
     def moving(*shapes: Array) -> list[IntArray]:
@@ -430,7 +428,7 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
 
     def stacked(shapes: tuple[Array, ...], chosen: list[IntArray]) -> Array:
         rows = [shape[which] for shape, which in zip(shapes, chosen, strict=True)]
-        return np.pad(np.concatenate(rows), ((0, 0), (0, stride - n_coefficients)))
+        return np.concatenate(rows)
 
     def numbered(chosen: list[IntArray]) -> tuple[IntArray, IntArray, IntArray]:
         """Start of each span, end of what its magnets feel, and the coordinates."""
@@ -454,15 +452,16 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
     for k in range(min(factor.shape)):
         factor[k:, k] = np.diagonal(lower, -k)
     factor[:, 0] = 1.0 / factor[:, 0]
-    middle = reduced.parameters.n_spans // 2
+    n_spans = reduced.parameters.n_spans
+    middle = n_spans // 2
     midspan = np.stack([reduced.midspan_z, reduced.midspan_y])
     row_start, column, stiffness = _rows(reduced.stiffness)
     carried_start, carried_column, carried = _rows(reduced.carried)
     damping_start, damping_column, damping_value = _rows(damping)
     return Line(
-        n_spans=reduced.parameters.n_spans,
+        n_spans=n_spans,
         span_length=reduced.parameters.span_length,
-        stride=stride,
+        stride=_stride(reduced.parameters),
         upright_start=upright_start,
         upright_felt=upright_felt,
         upright=upright_column,
@@ -470,8 +469,9 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
         sideways_felt=sideways_felt,
         sideways=sideways_column,
         rail_z=stacked(reduced.rail_z, upright),
-        rail_roll=stacked(reduced.rail_roll, sideways),
-        rail_y=stacked(reduced.rail_y, sideways),
+        rail_side=np.hstack(
+            [stacked(reduced.rail_roll, sideways), stacked(reduced.rail_y, sideways)]
+        ),
         n_modes=reduced.n_modes,
         row_start=row_start,
         column=column,
