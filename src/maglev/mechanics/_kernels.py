@@ -55,7 +55,8 @@ class Line(NamedTuple):
 
     n_spans: int
     span_length: float
-    stride: int  # rows of rail coefficients a span, even
+    stride: int  # rows of rail coefficients a span
+    n_units: int  # units of rail a span, each with as many rows, an even number
     upright_start: np.ndarray  # (span + 1,)
     upright_felt: np.ndarray  # (span,) end of those slow enough for a magnet to feel
     upright: np.ndarray  # coordinates that move a span's rails up and down
@@ -63,7 +64,8 @@ class Line(NamedTuple):
     sideways_felt: np.ndarray  # (span,)
     sideways: np.ndarray  # coordinates that roll a span or move it sideways
     rail_z: np.ndarray  # (upright, stride)
-    rail_side: np.ndarray  # (sideways, 2 stride) roll, then y
+    rail_roll: np.ndarray  # (sideways, stride)
+    rail_y: np.ndarray  # (sideways, stride)
     n_modes: int
     row_start: np.ndarray  # (coordinate + 1,) stiffness
     column: np.ndarray
@@ -128,9 +130,12 @@ def _gather(source, columns, start, stop, packed):
 
 
 @njit(cache=True, error_model="numpy")
-def _transform(matrix, start, stop, packed, target, first):
-    """``target[first + k] = Σ_m matrix[start + m, k] packed[m]``; two rows fill the registers."""
-    for k in range(0, matrix.shape[1], 2):
+def _transform(matrix, start, stop, packed, left, right, target, first):
+    """``target[first + k] = Σ_m matrix[start + m, k] packed[m]`` for ``left`` ≤ k < ``right``.
+
+    Two rows at once fill the registers.
+    """
+    for k in range(left, right, 2):
         a = load(packed, 0) * 0.0
         b = a
         for m in range(stop - start):
@@ -142,12 +147,12 @@ def _transform(matrix, start, stop, packed, target, first):
 
 
 @njit(cache=True, error_model="numpy")
-def _project(matrix, columns, start, stop, source, first, target):
-    """``target[columns[m]] += Σ_k matrix[m, k] source[first + k]``, two rows at once."""
+def _project(matrix, columns, start, stop, left, right, source, first, target):
+    """``target[columns[m]] += Σ_k matrix[m, k] source[first + k]`` for ``left`` ≤ k < ``right``."""
     for m in range(start, stop - 1, 2):
         a = load(target, columns[m])
         b = load(target, columns[m + 1])
-        for k in range(matrix.shape[1]):
+        for k in range(left, right):
             one = load(source, first + k)
             a = fma(one, matrix[m, k], a)
             b = fma(one, matrix[m + 1, k], b)
@@ -155,7 +160,7 @@ def _project(matrix, columns, start, stop, source, first, target):
         store(target, columns[m + 1], b)
     if (stop - start) % 2 == 1:
         a = load(target, columns[stop - 1])
-        for k in range(matrix.shape[1]):
+        for k in range(left, right):
             a = fma(load(source, first + k), matrix[stop - 1, k], a)
         store(target, columns[stop - 1], a)
 
@@ -335,6 +340,18 @@ def _line_acceleration(line, x, velocity, relative, force):
 
 
 @njit(cache=True, error_model="numpy")
+def _covered(line, span, tail, nose):
+    """Rows of a span's rail coefficients, from and to, of the units that the train is on."""
+    per_unit = line.stride // line.n_units
+    unit = line.span_length / line.n_units
+    start = span * line.span_length
+    # A pole may stand a rounding error beyond the ends of the train.
+    begin = int(np.floor((tail - start) / unit - 1.0e-6))
+    end = int(np.floor((nose - start) / unit + 1.0e-6)) + 1
+    return max(0, begin) * per_unit, min(line.n_units, end) * per_unit
+
+
+@njit(cache=True, error_model="numpy")
 def _keep_extreme(outcome, place, value, time):
     size = maximum(value, -1.0 * value)
     best = load(outcome.extreme, place)
@@ -401,7 +418,7 @@ def passage(
     stride = line.stride
     n_rail = line.n_spans * stride
     packed = np.zeros((max(line.upright.size, line.sideways.size), LANES))
-    side = np.zeros((2 * stride, LANES))
+    roll = np.zeros((stride, LANES))
     rail_motion = np.zeros((3, n_rail, LANES))  # right z, left z, y
     rail_velocity = np.zeros((3, n_rail, LANES))
     rail_force = np.zeros((3, n_rail, LANES))
@@ -434,23 +451,24 @@ def passage(
         last = min(line.n_spans - 1, int(np.floor(nose / line.span_length)))
         for span in range(first, last + 1):
             at = span * stride
+            begin, end = _covered(line, span, nose - run.train_length, nose)
             up, up_felt = line.upright_start[span], line.upright_felt[span]
             out, out_felt = line.sideways_start[span], line.sideways_felt[span]
             for quantity in range(2):
                 source = line_x if quantity == 0 else line_predicted
                 target = rail_motion if quantity == 0 else rail_velocity
                 _gather(source, line.upright, up, up_felt, packed)
-                _transform(line.rail_z, up, up_felt, packed, target[0], at)
+                _transform(line.rail_z, up, up_felt, packed, begin, end, target[0], at)
                 _gather(source, line.sideways, out, out_felt, packed)
-                _transform(line.rail_side, out, out_felt, packed, side, 0)
-                for k in range(stride):
-                    mean, turn = load(target[0], at + k), load(side, k)
+                _transform(line.rail_roll, out, out_felt, packed, begin, end, roll, 0)
+                _transform(line.rail_y, out, out_felt, packed, begin, end, target[2], at)
+                for k in range(begin, end):
+                    mean, turn = load(target[0], at + k), load(roll, k)
                     store(target[0], at + k, mean + turn)
                     store(target[1], at + k, mean - turn)
-                    store(target[2], at + k, load(side, stride + k))
             for field in range(3):
-                for k in range(stride):
-                    store(rail_force[field], at + k, load(side, 0) * 0.0)
+                for k in range(begin, end):
+                    store(rail_force[field], at + k, load(roll, k) * 0.0)
         _links(vehicle, x, predicted, force)
         _magnets(
             suspension_places, suspension, step, gains, x, predicted, force, rail_motion,
@@ -466,13 +484,16 @@ def passage(
             at = span * stride
             up, up_end = line.upright_start[span], line.upright_start[span + 1]
             out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
-            for k in range(stride):
-                right, left_one = load(rail_force[0], at + k), load(rail_force[1], at + k)
-                store(rail_force[0], at + k, right + left_one)
-                store(side, k, right - left_one)
-                store(side, stride + k, load(rail_force[2], at + k))
-            _project(line.rail_z, line.upright, up, up_end, rail_force[0], at, line_acceleration)
-            _project(line.rail_side, line.sideways, out, out_end, side, 0, line_acceleration)
+            begin, end = _covered(line, span, nose - run.train_length, nose)
+            for k in range(begin, end):
+                right, left = load(rail_force[0], at + k), load(rail_force[1], at + k)
+                store(rail_force[0], at + k, right + left)
+                store(roll, k, right - left)
+            force_z, force_y = rail_force[0], rail_force[2]
+            out_of = line_acceleration
+            _project(line.rail_z, line.upright, up, up_end, begin, end, force_z, at, out_of)
+            _project(line.rail_roll, line.sideways, out, out_end, begin, end, roll, 0, out_of)
+            _project(line.rail_y, line.sideways, out, out_end, begin, end, force_y, at, out_of)
         if reached:
             _line_acceleration(line, line_x, line_predicted, line_relative, line_acceleration)
         row = step // run.record_every - 1 if record else 0

@@ -462,6 +462,7 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
         n_spans=n_spans,
         span_length=reduced.parameters.span_length,
         stride=_stride(reduced.parameters),
+        n_units=reduced.parameters.rail.units_per_span,
         upright_start=upright_start,
         upright_felt=upright_felt,
         upright=upright_column,
@@ -469,9 +470,8 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
         sideways_felt=sideways_felt,
         sideways=sideways_column,
         rail_z=stacked(reduced.rail_z, upright),
-        rail_side=np.hstack(
-            [stacked(reduced.rail_roll, sideways), stacked(reduced.rail_y, sideways)]
-        ),
+        rail_roll=stacked(reduced.rail_roll, sideways),
+        rail_y=stacked(reduced.rail_y, sideways),
         n_modes=reduced.n_modes,
         row_start=row_start,
         column=column,
