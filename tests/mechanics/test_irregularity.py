@@ -59,7 +59,7 @@ def test_welch_spectrum_lies_on_the_target(law):
     density = []
     for seed in range(2):
         line = profile(irregularity, (0.0, 1000.0), seed=seed)
-        step = 20  # 0.1 m: ten samples in the shortest wave
+        step = 6  # 0.094 m: ten samples in the shortest wave
         n, found = signal.welch(
             line.values[::2, ::step], fs=1 / (step * line.dx), nperseg=2048, window="hann"
         )
@@ -99,14 +99,14 @@ def test_sides_share_one_profile_unless_told_otherwise():
     assert np.abs(correlation - np.eye(4)).max() < 0.3
 
 
-def test_interpolation_is_exact_to_a_billionth():
+def test_interpolation_is_exact_to_a_ten_millionth():
     # With half the points the error is sixteen times as large, and its largest lies midway.
     half = Profile(LINE.x0, 2 * LINE.dx, LINE.values[:, ::2], LINE.slopes[:, ::2])
     inner = slice(1, half.values.shape[1] * 2 - 2, 2)
     value, slope = displacement(half, grid(LINE)[inner])
     full = np.abs(LINE.values).max(axis=1, keepdims=True)
-    assert np.abs((value - LINE.values[:, inner]) / full).max() < 16e-9
-    assert_allclose(slope, LINE.slopes[:, inner], atol=1e-5 * np.abs(LINE.slopes).max())
+    assert np.abs((value - LINE.values[:, inner]) / full).max() < 16e-7
+    assert_allclose(slope, LINE.slopes[:, inner], atol=1e-4 * np.abs(LINE.slopes).max())
 
 
 def test_interpolation_of_the_shortest_wave_follows_a_cosine():
@@ -116,7 +116,7 @@ def test_interpolation_of_the_shortest_wave_follows_a_cosine():
     line = profile(short, (0.0, 20.0), seed=1)
     value, slope = displacement(line, np.random.default_rng(0).uniform(0.0, 20.0, 500))
     amplitude = np.sqrt(2 * 2.3e-8 * n**-1.5 * spacing)
-    assert_allclose(np.hypot(value[0], slope[0] / (2 * np.pi * n)), amplitude, rtol=1e-6)
+    assert_allclose(np.hypot(value[0], slope[0] / (2 * np.pi * n)), amplitude, rtol=1e-5)
     assert np.abs(value[0]).max() > 0.99 * amplitude
     assert np.abs(slope[0]).max() > 0.99 * amplitude * 2 * np.pi * n
 
@@ -224,6 +224,6 @@ def test_an_empty_range_is_refused(length_range):
 
 
 def test_places_outside_the_grid_are_refused():
-    with pytest.raises(ValueError, match=r"range -200 to 800 m, got 0 to 800.1 m"):
+    with pytest.raises(ValueError, match=r"range -200.006 to 800.007 m, got 0 to 800.1 m"):
         displacement(LINE, [0.0, 800.1])
-    assert_allclose(displacement(LINE, 800.0)[0], LINE.values[:, -1], rtol=1e-9)
+    assert_allclose(displacement(LINE, grid(LINE)[-1])[0], LINE.values[:, -1], rtol=1e-9)

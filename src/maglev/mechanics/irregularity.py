@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.fft import ifft, next_fast_len
 from scipy.interpolate import CubicSpline
 
 from maglev.parameters import GermanLaw, Irregularity, PowerLaw, RationalLaw, Spectrum
@@ -20,11 +21,9 @@ FloatArray = npt.NDArray[np.float64]
 PROFILE_NAMES = ("vertical_right", "vertical_left", "lateral_right", "lateral_left")
 """Order of the ``profile`` dimension."""
 
-_POINTS_PER_WAVELENGTH = 200
-"""Grid points in the shortest wavelength: cubic Hermite interpolation errs by (2 pi / 200)^4 / 384
-= 2.5e-9 of the shortest cosine's amplitude, less than 1e-9 of the whole profile's extreme."""
-
-_BLOCKS_TOGETHER = 64  # wavelengths summed at once: large enough for the matrix product to be fast
+_POINTS_PER_WAVELENGTH = 64
+"""Grid points in the shortest wavelength: cubic Hermite interpolation errs by (2 pi / 64)^4 / 384
+= 2.4e-7 of the shortest cosine's amplitude, less than 1e-7 of the whole profile's extreme."""
 
 
 @dataclass(frozen=True)
@@ -108,11 +107,10 @@ def profile(
     start, end = length_range
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
         raise ValueError(f"length_range must rise from finite start to end, got {length_range} m")
-    block = irregularity.wavelength_min
-    first, last = math.floor(start / block), math.ceil(end / block)
-    dx = block / _POINTS_PER_WAVELENGTH
-    grid = np.arange(first * _POINTS_PER_WAVELENGTH, last * _POINTS_PER_WAVELENGTH + 1)
-    x = grid * dx
+    random = irregularity.enabled and measured is None
+    dx, period = _grid(irregularity) if random else (_coarse(irregularity), 0)
+    first, last = math.floor(start / dx), math.ceil(end / dx)
+    x = np.arange(first, last + 1) * dx
     if not irregularity.enabled:
         zeros = np.zeros((len(PROFILE_NAMES), x.size))
         return Profile(x0=float(x[0]), dx=dx, values=zeros, slopes=zeros.copy())
@@ -124,7 +122,7 @@ def profile(
             "read; give it as 'measured'"
         )
     else:
-        values, slopes = _random(irregularity, first, last, seed)
+        values, slopes = _random(irregularity, first, last, period, seed)
     ramp, ramp_slope = _fade_in(x, irregularity.fade_in)
     return Profile(
         x0=float(x[0]),
@@ -242,10 +240,24 @@ def wavenumbers(irregularity: Irregularity) -> tuple[FloatArray, float]:
     return lowest + (np.arange(irregularity.n_harmonics) + 0.5) * spacing, spacing
 
 
+def _coarse(irregularity: Irregularity) -> float:
+    """Grid spacing of what is not a sum of harmonics [m]."""
+    return irregularity.wavelength_min / _POINTS_PER_WAVELENGTH
+
+
+def _grid(irregularity: Irregularity) -> tuple[float, int]:
+    """Grid spacing [m], and the points after which every harmonic has gone through whole turns
+    beyond those of the longest."""
+    _, spacing = wavenumbers(irregularity)
+    points = math.ceil(_POINTS_PER_WAVELENGTH / (spacing * irregularity.wavelength_min))
+    period = next_fast_len(max(points, irregularity.n_harmonics))
+    return 1 / (spacing * period), period
+
+
 def _random(
-    irregularity: Irregularity, first: int, last: int, seed: int
+    irregularity: Irregularity, first: int, last: int, period: int, seed: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Sums of harmonics on the grid from block ``first`` to block ``last``, one row a profile."""
+    """Sums of harmonics on the points ``first`` to ``last`` of the grid, one row a profile."""
     wavenumber, spacing = wavenumbers(irregularity)
     children = np.random.SeedSequence(seed).spawn(len(PROFILE_NAMES))
     rows = []
@@ -259,9 +271,7 @@ def _random(
         for child in sides:
             phase = 2 * np.pi * np.random.default_rng(child).random(wavenumber.size)
             coefficient = amplitude * np.exp(1j * phase)
-            sums.append(
-                _harmonic_sum(coefficient, wavenumber, irregularity.wavelength_min, first, last)
-            )
+            sums.append(_harmonic_sum(coefficient, wavenumber, spacing, first, last, period))
         rows += [sums[0], sums[-1]]
     return np.stack([value for value, _ in rows]), np.stack([slope for _, slope in rows])
 
@@ -269,31 +279,25 @@ def _random(
 def _harmonic_sum(
     coefficient: npt.NDArray[np.complex128],
     wavenumber: FloatArray,
-    block: float,
+    spacing: float,
     first: int,
     last: int,
+    period: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Real part of sum c_k exp(2 pi i n_k x) and its slope on the points of a stretch of blocks.
+    """Real part of sum c_k exp(2 pi i n_k x) and its slope on a stretch of the grid.
 
-    Within a block, x = x_block + s: the factors exp(2 pi i n_k s) serve all blocks.  Blocks go in
-    groups that are counted from x = 0, so that every group is the same product of the same shape
-    wherever the stretch begins and ends.
+    With n_k = n_0 + k spacing and x_j = j / (spacing period), the sum is the turn exp(2 pi i n_0 x)
+    of the longest harmonic times a discrete Fourier transform, which repeats after ``period``
+    points; so a point has the same bits wherever the stretch begins and ends.
     """
-    points, together = _POINTS_PER_WAVELENGTH, _BLOCKS_TOGETHER
-    rate = 2j * np.pi * wavenumber
-    within = np.arange(points) * (block / points)
-    fine = np.exp(np.outer(within, rate))
-    first_group, last_group = first // together, last // together
-    values, slopes = np.empty((2, last_group - first_group + 1, together, points))
-    for group in range(first_group, last_group + 1):
-        start = (group * together + np.arange(together)) * block
-        carrier = coefficient[:, None] * np.exp(np.outer(rate, start))
-        here = group - first_group
-        values[here] = (fine @ carrier).real.T
-        slopes[here] = (fine @ (rate[:, None] * carrier)).real.T
-    skip = (first - first_group * together) * points
-    wanted = slice(skip, skip + (last - first) * points + 1)
-    return values.ravel()[wanted], slopes.ravel()[wanted]
+    point = np.arange(first, last + 1)
+    turn = np.exp(2j * np.pi * wavenumber[0] / (spacing * period) * point)
+    of_slope = 2j * np.pi * wavenumber * coefficient
+    values, slopes = (
+        (turn * ifft(c, period, norm="forward")[point % period]).real
+        for c in (coefficient, of_slope)
+    )
+    return values, slopes
 
 
 def _splined(
