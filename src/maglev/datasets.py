@@ -489,6 +489,17 @@ def _study_table() -> dict[str, Variable]:
             _number(level, OF_RESPONSE, "limit that is exceeded with the failure probability"),
         ),
         "limit_status": _code(level, "what can be said of the limit", LIMIT_STATUS),
+        **_with_ends(
+            "held_limit",
+            _number(
+                level,
+                OF_RESPONSE,
+                "limit that is exceeded with the failure probability given that levitation holds",
+            ),
+        ),
+        "held_limit_status": _code(
+            level, "what can be said of the limit given that levitation holds", LIMIT_STATUS
+        ),
         "sigma": _number("response", OF_RESPONSE, "standard deviation that errors are divided by"),
         # accuracy
         "step_n_runs": _number(
@@ -498,6 +509,15 @@ def _study_table() -> dict[str, Variable]:
         "step_limit_error": _number(
             step_level, "1", "limit less that of the baseline, over the standard deviation"
         ),
+        "step_held_limit_error": _number(
+            step_level,
+            "1",
+            "limit given that levitation holds less that of the baseline, over the standard "
+            "deviation",
+        ),
+        "step_lost_probability": _number(
+            "method step", "1", "share of the baseline's points predicted to be lost"
+        ),
         "step_rmse": _number(
             "method step response",
             OF_RESPONSE,
@@ -506,6 +526,15 @@ def _study_table() -> dict[str, Variable]:
         "reference_limit": _number(level, OF_RESPONSE, "limit from the baseline"),
         "reference_half_width": _number(
             level, "1", "half the interval of the baseline's limit, over the standard deviation"
+        ),
+        "reference_held_limit": _number(
+            level, OF_RESPONSE, "limit from the baseline given that levitation holds"
+        ),
+        "reference_held_half_width": _number(
+            level,
+            "1",
+            "half the interval of the baseline's limit given that levitation holds, over the "
+            "standard deviation",
         ),
         # random track
         "density_both": _number(
@@ -548,6 +577,19 @@ def _study_table() -> dict[str, Variable]:
             "method response failure_probability", "what can be said of the limit", LIMIT_STATUS
         ),
         **_with_ends(
+            "table_held_limit",
+            _number(
+                "method response failure_probability",
+                OF_RESPONSE,
+                "limit that is exceeded with the failure probability given that levitation holds",
+            ),
+        ),
+        "table_held_limit_status": _code(
+            "method response failure_probability",
+            "what can be said of the limit given that levitation holds",
+            LIMIT_STATUS,
+        ),
+        **_with_ends(
             "table_lost_probability",
             _number("method", "1", "probability that levitation is lost"),
         ),
@@ -572,7 +614,13 @@ def _study_table() -> dict[str, Variable]:
         "check_kind": _code(
             "check",
             "what is checked",
-            ("halves_agree", "limit_against_baseline", "lost_probability_against_baseline"),
+            (
+                "halves_agree",
+                "limit_against_baseline",
+                "lost_probability_against_baseline",
+                "held_halves_agree",
+                "held_limit_against_baseline",
+            ),
         ),
         "check_case": _number("check", "1", "case that is checked, see flag_meanings", "int32"),
         "check_method": _code("check", "method that is checked", METHODS),
@@ -754,7 +802,13 @@ LAYOUTS: Mapping[str, Layout] = {
     ),
     "limits": Layout(
         title="Limits of the extremes at given failure probabilities",
-        variables=(*_ends("limit", "lost_probability"), "limit_status", "n_runs", "sigma"),
+        variables=(
+            *_ends("limit", "held_limit", "lost_probability"),
+            "limit_status",
+            "held_limit_status",
+            "n_runs",
+            "sigma",
+        ),
     ),
     "accuracy": Layout(
         title="Accuracy of limits against number of runs",
@@ -762,9 +816,13 @@ LAYOUTS: Mapping[str, Layout] = {
             "step_n_runs",
             "step_limit",
             "step_limit_error",
+            "step_held_limit_error",
+            "step_lost_probability",
             "step_rmse",
             "reference_limit",
             "reference_half_width",
+            "reference_held_limit",
+            "reference_held_half_width",
             "sigma",
         ),
     ),
@@ -782,8 +840,9 @@ LAYOUTS: Mapping[str, Layout] = {
     "table1": Layout(
         title="Limits of the extremes by each method",
         variables=(
-            *_ends("table_limit", "table_lost_probability"),
+            *_ends("table_limit", "table_held_limit", "table_lost_probability"),
             "table_limit_status",
+            "table_held_limit_status",
             "table_n_runs",
         ),
     ),

@@ -7,8 +7,27 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import binom, norm
 from synthetic import BORDER, CONFIG, P_LOST
 
-from maglev.datasets import DENSITY_METHODS, LIMIT_STATUS, RESPONSES, SURROGATES, check, describe
-from maglev.stages import accuracy, density, eev, limits, surrogate, track_split
+from maglev.datasets import (
+    DENSITY_METHODS,
+    LIMIT_STATUS,
+    METHODS,
+    RESPONSES,
+    SURROGATES,
+    check,
+    describe,
+)
+from maglev.stages import (
+    accuracy,
+    density,
+    eev,
+    limits,
+    paper_and_ours,
+    statistics_check,
+    surrogate,
+    table1,
+    tables,
+    track_split,
+)
 from maglev.uncertainty.selection import KINDS
 
 LEVELS = np.array(CONFIG.study.failure_probability)
@@ -231,3 +250,119 @@ def test_shares_of_gains_and_track_are_those_of_a_sum():
             made(gain, track),
             parts | {"other_gains": made(gain, track).isel(sample=slice(9))},
         )
+
+
+def test_limits_given_that_levitation_holds_know_no_losses(losing):
+    found = losing["limits"]
+    population = np.random.default_rng(2).standard_normal((200_000, 4))
+    population = population[population[:, 0] > BORDER]
+    exact = np.quantile(synthetic.extremes(population)[:, 0], 1.0 - LEVELS)
+    assert (found["held_limit_status"] == 0).all()
+    assert_allclose(found["held_limit"][0], exact, atol=3e-7)
+    assert (found["held_limit_low"] <= found["held_limit"]).all()
+    assert (found["held_limit"] < found["limit"]).all()
+
+
+@pytest.fixture(scope="module")
+def by_method():
+    """Baseline and limits of two methods, one of which is wrong by half a deviation."""
+    runs = synthetic.baseline(4000, loses=True)
+    truth, made = limits.of_baseline(CONFIG, runs), synthetic.design(100, loses=True)
+    good = limits.of_surrogate(CONFIG, made, surrogate.dataset(CONFIG, "asm", made))
+    bad = good.assign(
+        {name: good[name] + 0.5 * good["sigma"] for name in ("limit", "held_limit")}
+    ).assign(lost_probability=0.2)
+    return runs, {"mcm": truth, "osm": bad, "asm": good}
+
+
+def test_the_check_tells_a_good_method_from_a_bad_one(by_method):
+    runs, found = by_method
+    pairs = {("here", method): one for method, one in found.items()}
+    made = describe(statistics_check.dataset(CONFIG, {"here": runs}, pairs))
+    check(made, "statistics_check")
+    assert made["check_case"].attrs["flag_meanings"] == "here"
+
+    def verdicts(kind, method):
+        chosen = (made["check_kind"] == kind) & (made["check_method"] == METHODS.index(method))
+        return made["check_passed"].to_numpy()[chosen]
+
+    yes, no = statistics_check.YES, statistics_check.NO
+    for kind in (statistics_check.HALVES, statistics_check.HELD_HALVES):
+        assert np.mean(verdicts(kind, "mcm") == yes) > 0.9
+    for kind in (statistics_check.LIMIT, statistics_check.HELD_LIMIT):
+        assert np.mean(verdicts(kind, "asm") == yes) > 0.8
+    assert np.mean(verdicts(statistics_check.HELD_LIMIT, "osm") == no) > 0.9
+    assert verdicts(statistics_check.LOSS, "asm") == [yes]
+    assert verdicts(statistics_check.LOSS, "osm") == [no]
+    infinite = made["check_failure_probability"] == 0.01  # for both, as losses are likelier
+    both = infinite & (made["check_kind"] == statistics_check.LIMIT)
+    assert (made["check_passed"].to_numpy()[both] == yes).all()
+
+
+def test_halves_from_different_populations_disagree():
+    runs = synthetic.baseline(2000)
+    values = synthetic.extremes(runs["standard"].to_numpy())
+    values[1000:] += 0.5 * values.std(axis=0)
+    moved = synthetic.runs(runs["standard"].to_numpy(), values=values)
+    made = statistics_check.dataset(CONFIG, {"here": moved}, {})
+    halves = made["check_kind"] == statistics_check.HALVES
+    at = halves & (made["check_failure_probability"] >= 0.1)
+    assert (made["check_passed"].to_numpy()[at] == statistics_check.NO).all()
+    assert (made["check_value"].to_numpy()[at] > 1.0).all()  # the second half lies higher
+
+
+def test_a_level_that_a_half_cannot_carry_is_not_decided():
+    made = statistics_check.dataset(CONFIG, {"here": synthetic.baseline(1000)}, {})
+    at = made["check_failure_probability"] == 0.01  # five exceedances in each half
+    assert (made["check_passed"].to_numpy()[at] == statistics_check.UNDECIDED).all()
+
+
+def test_table_1_holds_every_limit_and_says_where_there_is_none(by_method):
+    _, found = by_method
+    table = describe(table1.dataset(found))
+    check(table, "table1")
+    rows = table1.rows(table)
+    assert len(rows) == 6 * 3 * 3
+    assert rows[1]["method"] == "osm" and rows[1]["failure_probability"] == 0.2
+    assert rows[1]["limit"] == float(found["osm"]["limit"][0, 0])
+    text = table1.text(table, "Table 1")
+    assert "| girder_displacement_z [m] | 0.2 | " in text
+    assert text.count("none, losses are likelier") == 6 * 3
+    assert table1.dataset({"asm": found["asm"]}).sizes["method"] == 1
+    with pytest.raises(ValueError, match="same failure probabilities"):
+        table1.dataset(found | {"asm": found["asm"].isel(failure_probability=slice(2))})
+
+
+def test_the_papers_numbers_stand_beside_ours_with_reasons_from_the_files(held):
+    runs = synthetic.baseline(1500)
+    designs = {"osm": synthetic.design(60), "asm": held["design"]}
+    judged = accuracy.dataset(CONFIG, runs, designs)
+    shown = density.of_baseline(CONFIG, runs)
+    densities = {"mcm": shown, "osm": held["density"], "asm": held["density"]}
+    table = describe(paper_and_ours.dataset(densities, designs, judged))
+    check(table, "paper_and_ours")
+    peak = float(held["density"]["peak"][0])
+    assert table["paper_peak"][1, METHODS.index("osm")] == peak
+    assert_allclose(table["paper_peak_error"][1, 3], peak / shown["peak_direct"][0] - 1.0)
+    assert table["paper_peak"][0, 0] == 6.37e4 and np.isnan(table["paper_peak"][0, 3])
+    assert_allclose(table["paper_deviation"][0, 0], 6.26e-6, rtol=1e-3)
+    reason = table["paper_rmse"].attrs["why_different"]
+    assert "on 1500 runs of the baseline" in reason and "asm 0.000 at 60 runs" in reason
+    assert "60 runs, 0 of them lost" in table["paper_n_runs"].attrs["why_different"]
+    rows = paper_and_ours.rows(table)
+    assert {row["method"] for row in rows} == set(METHODS)
+    assert not any(value != value for row in rows for value in row.values())
+    text = paper_and_ours.text(table, "Paper and ours")
+    assert "| mcm | 63700 | " in text and "nan" not in text
+    with pytest.raises(ValueError, match="compared with a baseline"):
+        paper_and_ours.dataset({"asm": held["density"]}, designs, judged)
+
+
+def test_tables_are_marked_where_they_are_no_result(tmp_path):
+    rows = [{"a": 1.0, "b": "x"}]
+    tables.write(tmp_path / "t", rows, "# T\n", demonstration=True)
+    assert (tmp_path / "t.csv").read_text() == "a,b,demonstration\n1.0,x,yes\n"
+    assert (tmp_path / "t.md").read_text().startswith("*Demonstration, not a result.*")
+    tables.write(tmp_path / "t", rows, "# T\n", demonstration=False)
+    assert (tmp_path / "t.csv").read_text() == "a,b\n1.0,x\n"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["t.csv", "t.md"]

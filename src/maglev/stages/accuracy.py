@@ -88,14 +88,21 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
     points = baseline["standard"].to_numpy()
     sigma = truth[~away].std(axis=0)
     reference = baseline_limits(config, truth, away)
-    reference_limit = np.array([one.limit for one in reference])
-    width = np.array([one.upper - one.lower for one in reference])
+    held_reference = baseline_limits(config, truth[~away], away[~away])
+    reference_limit, reference_held = (
+        np.array([one.limit for one in of]) for of in (reference, held_reference)
+    )
+    half_width, held_half_width = (
+        np.array([0.5 * (one.upper - one.lower) for one in of]) / sigma[:, None]
+        for of in (reference, held_reference)
+    )
 
     sizes = steps(designs)
     n_steps = max(len(one) for one in sizes.values())
     shape = (len(designs), n_steps, len(RESPONSES))
     n_runs = np.zeros(shape[:2], dtype=int)
-    rmse, limit = np.full(shape, np.nan), np.full((*shape, len(levels)), np.nan)
+    rmse, share = np.full(shape, np.nan), np.full(shape[:2], np.nan)
+    limit, held_limit = (np.full((*shape, len(levels)), np.nan) for _ in range(2))
     names = sorted(designs, key=METHODS.index)
     for row, name in enumerate(names):
         choice = getattr(config.study, name).surrogate
@@ -107,11 +114,12 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
             found = predictor(config, part, choice)
             predicted, held = found.surrogate.predict(points), found.held(points)
             rmse[row, step] = np.sqrt(np.mean((predicted - truth)[~away] ** 2, axis=0))
-            if held.any():
-                limit[row, step] = [
-                    sample_limits(
-                        predicted[held, response], levels, n_lost=int(np.count_nonzero(~held))
-                    ).limit
+            share[row, step] = 1.0 - held.mean()
+            if not held.any():
+                continue
+            for of, without in ((limit, int(np.count_nonzero(~held))), (held_limit, 0)):
+                of[row, step] = [
+                    sample_limits(predicted[held, response], levels, n_lost=without).limit
                     for response in range(len(RESPONSES))
                 ]
         _LOG.info("%s: judged at %s runs", name, ", ".join(map(str, sizes[name])))
@@ -125,9 +133,16 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
                 (*of_step, "failure_probability"),
                 (limit - reference_limit) / sigma[:, None],
             ),
+            "step_held_limit_error": (
+                (*of_step, "failure_probability"),
+                (held_limit - reference_held) / sigma[:, None],
+            ),
+            "step_lost_probability": (of_step[:2], share),
             "step_rmse": (of_step, rmse),
             "reference_limit": (level, reference_limit),
-            "reference_half_width": (level, 0.5 * width / sigma[:, None]),
+            "reference_half_width": (level, half_width),
+            "reference_held_limit": (level, reference_held),
+            "reference_held_half_width": (level, held_half_width),
             "sigma": ("response", sigma),
         },
         coords=coordinates(

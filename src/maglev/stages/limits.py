@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -44,11 +46,11 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
     """
     values, away = extremes(runs), lost(runs)
     n_lost = int(np.count_nonzero(away))
-    limits = baseline_limits(config, values, away)
     low, high = binomial_interval(n_lost, away.size, config.study.confidence)
     result = _dataset(
         config,
-        limits,
+        baseline_limits(config, values, away),
+        baseline_limits(config, values[~away], away[~away]),
         lost_probability=(n_lost / away.size, float(low), float(high)),
         n_runs=away.size,
         sigma=values[~away].std(axis=0),
@@ -123,40 +125,23 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
         raise ValueError(f"all {held.size} points of the population are predicted to be lost")
     predictions = found.surrogate.predict(points[held])
     learnt = loss.region is not None
-    limits = []
-    for response in range(len(RESPONSES)):
-        common = {
-            "lost_probability": loss.probability,
-            "lost_interval": (loss.lower, loss.upper) if learnt else None,
-            "confidence": config.study.confidence,
-        }
-        levels = config.study.failure_probability
-        plain = surrogate_limits(predictions[:, response], levels, error_range=(0.0, 0.0), **common)
-        # a limit that is not given has no place; any range serves it
-        at = np.where(np.isnan(plain.limit), training[:, response].max(), plain.limit)
-        low, high = error_range_near(
-            at, training[:, response], residuals[:, response], config.study.confidence
-        )
-        ends = [
-            surrogate_limits(
-                predictions[:, response], level, error_range=(low[k], high[k]), **common
+    losing = {
+        "lost_probability": loss.probability,
+        "lost_interval": (loss.lower, loss.upper) if learnt else None,
+    }
+    limits, held_limits = (
+        [
+            _surrogate_limits(
+                config, predictions[:, response], training[:, response], residuals[:, response], of
             )
-            for k, level in enumerate(levels)
+            for response in range(len(RESPONSES))
         ]
-        limits.append(
-            Limits(
-                failure_probability=plain.failure_probability,
-                limit=plain.limit,
-                lower=np.concatenate([one.lower for one in ends]),
-                upper=np.concatenate([one.upper for one in ends]),
-                expected_exceedances=plain.expected_exceedances,
-                status=plain.status,
-                confidence=plain.confidence,
-            )
-        )
+        for of in (losing, {})
+    )
     result = _dataset(
         config,
         limits,
+        held_limits,
         lost_probability=(loss.probability, loss.lower, loss.upper),
         n_runs=design.sizes["sample"],
         sigma=predictions.std(axis=0),
@@ -170,6 +155,31 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
     return result
 
 
+def _surrogate_limits(
+    config: Config,
+    predictions: FloatArray,
+    training: FloatArray,
+    residuals: FloatArray,
+    losing: dict[str, Any],
+) -> Limits:
+    """Limits of one response, each with the range of the surrogate's errors near it."""
+    levels = config.study.failure_probability
+    common = {**losing, "confidence": config.study.confidence}
+    plain = surrogate_limits(predictions, levels, error_range=(0.0, 0.0), **common)
+    # a limit that is not given has no place; any range serves it
+    at = np.where(np.isnan(plain.limit), training.max(), plain.limit)
+    low, high = error_range_near(at, training, residuals, config.study.confidence)
+    ends = [
+        surrogate_limits(predictions, level, error_range=(low[k], high[k]), **common)
+        for k, level in enumerate(levels)
+    ]
+    return replace(
+        plain,
+        lower=np.concatenate([one.lower for one in ends]),
+        upper=np.concatenate([one.upper for one in ends]),
+    )
+
+
 def status_numbers(limits: Limits) -> list[int]:
     """What can be said of each limit, as the code of a file (level,)."""
     return [LIMIT_STATUS.index(_STATUS[status]) for status in limits.status]
@@ -178,37 +188,37 @@ def status_numbers(limits: Limits) -> list[int]:
 def _dataset(
     config: Config,
     limits: list[Limits],
+    held_limits: list[Limits],
     *,
     lost_probability: tuple[float, float, float],
     n_runs: int,
     sigma: FloatArray,
 ) -> xr.Dataset:
     level = ("response", "failure_probability")
-    status = np.array([status_numbers(one) for one in limits])
-    infinite = status == LIMIT_STATUS.index("infinite")
-
-    def column(name: str) -> FloatArray:
-        """An infinite limit is written as such, with an unbounded interval above."""
-        values = np.array([getattr(one, name) for one in limits])
-        return values if name == "lower" else np.where(infinite, np.inf, values)
-
+    columns: dict[str, tuple[tuple[str, ...], np.ndarray]] = {}
+    for name, of in (("limit", limits), ("held_limit", held_limits)):
+        status = np.array([status_numbers(one) for one in of])
+        infinite = status == LIMIT_STATUS.index("infinite")
+        for end, suffix in (("limit", ""), ("lower", "_low"), ("upper", "_high")):
+            values = np.array([getattr(one, end) for one in of])
+            if end != "lower":  # losses alone are likelier: no finite limit, no upper end
+                values = np.where(infinite, np.inf, values)
+            columns[f"{name}{suffix}"] = (level, values)
+        columns[f"{name}_status"] = (level, status)
     for response, name in enumerate(RESPONSES):
         said = [
             f"{p:g}: {value:.4g}" if code == 0 else f"{p:g}: {LIMIT_STATUS[code]}"
             for p, value, code in zip(
                 config.study.failure_probability,
-                limits[response].limit,
-                status[response],
+                columns["limit"][1][response],
+                columns["limit_status"][1][response],
                 strict=True,
             )
         ]
         _LOG.info("%s %s", name, ", ".join(said))
     return xr.Dataset(
         {
-            "limit": (level, column("limit")),
-            "limit_low": (level, column("lower")),
-            "limit_high": (level, column("upper")),
-            "limit_status": (level, status),
+            **columns,
             "lost_probability": ((), lost_probability[0]),
             "lost_probability_low": ((), lost_probability[1]),
             "lost_probability_high": ((), lost_probability[2]),

@@ -12,12 +12,12 @@ import xarray as xr
 from maglev.datasets import LIMIT_STATUS, METHODS, RESPONSES
 from maglev.parameters import Config
 from maglev.stages.density import binomial_interval
-from maglev.stages.extremes import extremes, lost
+from maglev.stages.extremes import FloatArray, extremes, lost
 from maglev.stages.limits import baseline_limits, status_numbers
 
 _LOG = logging.getLogger(__name__)
 
-HALVES, LIMIT, LOSS = range(3)
+HALVES, LIMIT, LOSS, HELD_HALVES, HELD_LIMIT = range(5)
 """Codes of ``check_kind``."""
 
 NO, YES, UNDECIDED = range(3)
@@ -33,7 +33,7 @@ class Check:
     Parameters
     ----------
     kind
-        ``HALVES``, ``LIMIT`` or ``LOSS``.
+        ``HALVES``, ``LIMIT``, ``LOSS``, ``HELD_HALVES`` or ``HELD_LIMIT``.
     case, method
         What was checked.
     response
@@ -68,7 +68,7 @@ def dataset(
     parts of their intervals that face each other, which passes if the intervals meet; each
     method's limit less the baseline's over half the interval of the latter, which passes within
     one; each method's probability of loss, which passes within the binomial interval of the
-    baseline's count.
+    baseline's count.  The first two are repeated for limits given that levitation holds.
 
     Parameters
     ----------
@@ -97,11 +97,20 @@ def dataset(
         raise ValueError(f"the case '{strange[0]}' has limits and no baseline; run its baseline")
     checks: list[Check] = []
     for case, runs in baselines.items():
-        checks += _halves(config, case, runs)
+        values, away = extremes(runs), lost(runs)
+        checks += _halves(config, case, HALVES, values, away)
+        checks += _halves(config, case, HELD_HALVES, values[~away], away[~away])
         for (of_case, method), found in limits.items():
             if of_case == case and method != "mcm":
-                checks += _against(config, case, method, runs, found)
-    for kind, words in enumerate(("halves agree", "limits agree", "losses agree")):
+                checks += _against(config, case, method, values, away, found)
+    words_of = {
+        HALVES: "limits of halves agree",
+        HELD_HALVES: "limits of halves, given that levitation holds, agree",
+        LIMIT: "limits agree with the baseline",
+        HELD_LIMIT: "limits, given that levitation holds, agree with the baseline",
+        LOSS: "probabilities of loss agree with the baseline",
+    }
+    for kind, words in words_of.items():
         passed = [one.passed for one in checks if one.kind == kind]
         _LOG.info(
             "%s: %d yes, %d no, %d cannot be decided",
@@ -111,12 +120,13 @@ def dataset(
     return _dataset(checks, list(baselines))
 
 
-def _halves(config: Config, case: str, runs: xr.Dataset) -> list[Check]:
-    """Limits of the first and the second half of a baseline."""
-    values, away = extremes(runs), lost(runs)
+def _halves(
+    config: Config, case: str, kind: int, values: FloatArray, away: np.ndarray
+) -> list[Check]:
+    """Limits of the first and the second half of a baseline, or of its runs that held."""
     middle = away.size // 2
     parts = [slice(0, middle), slice(middle, 2 * middle)]
-    if any(away[part].all() for part in parts):
+    if middle == 0 or any(away[part].all() for part in parts):
         raise ValueError(f"a half of the baseline of '{case}' has no run that held")
     first, second = (baseline_limits(config, values[part], away[part]) for part in parts)
     checks = []
@@ -127,22 +137,31 @@ def _halves(config: Config, case: str, runs: xr.Dataset) -> list[Check]:
             facing = (upper.limit[k] - lower.limit[k], lower.upper[k] - lower.limit[k])
             reach = facing[1] + upper.limit[k] - upper.lower[k]
             value = _ratio(b.limit[k] - a.limit[k], reach)
-            checks.append(_judged(HALVES, case, "mcm", response, level, value, -1.0, 1.0, code))
+            checks.append(_judged(kind, case, "mcm", response, level, value, -1.0, 1.0, code))
     return checks
 
 
 def _against(
-    config: Config, case: str, method: str, runs: xr.Dataset, found: xr.Dataset
+    config: Config,
+    case: str,
+    method: str,
+    values: FloatArray,
+    away: np.ndarray,
+    found: xr.Dataset,
 ) -> list[Check]:
     """Limits and losses of a method against those of the baseline."""
-    values, away = extremes(runs), lost(runs)
     checks = []
-    for response, truth in enumerate(baseline_limits(config, values, away)):
-        codes = zip(status_numbers(truth), found["limit_status"].to_numpy()[response], strict=True)
-        for k, (level, code) in enumerate(zip(truth.failure_probability, codes, strict=True)):
-            difference = float(found["limit"][response, k]) - truth.limit[k]
-            value = _ratio(difference, 0.5 * (truth.upper[k] - truth.lower[k]))
-            checks.append(_judged(LIMIT, case, method, response, level, value, -1.0, 1.0, code))
+    for kind, name, truths in (
+        (LIMIT, "limit", baseline_limits(config, values, away)),
+        (HELD_LIMIT, "held_limit", baseline_limits(config, values[~away], away[~away])),
+    ):
+        limit, status = found[name].to_numpy(), found[f"{name}_status"].to_numpy()
+        for response, truth in enumerate(truths):
+            codes = zip(status_numbers(truth), status[response], strict=True)
+            for k, (level, code) in enumerate(zip(truth.failure_probability, codes, strict=True)):
+                half = 0.5 * (truth.upper[k] - truth.lower[k])
+                value = _ratio(limit[response, k] - truth.limit[k], half)
+                checks.append(_judged(kind, case, method, response, level, value, -1.0, 1.0, code))
     low, high = binomial_interval(float(np.count_nonzero(away)), away.size, config.study.confidence)
     value = float(found["lost_probability"])
     none = (_GIVEN, _GIVEN)

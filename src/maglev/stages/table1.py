@@ -11,7 +11,9 @@ from maglev.datasets import LIMIT_STATUS, METHODS, RESPONSE_UNITS, RESPONSES
 from maglev.stages.extremes import coordinates, method_number
 from maglev.stages.tables import markdown, number
 
-_OF_METHOD = ("limit", "limit_low", "limit_high", "limit_status")
+_OF_METHOD = tuple(
+    f"{name}{end}" for name in ("limit", "held_limit") for end in ("", "_low", "_high", "_status")
+)
 _LOST = ("lost_probability", "lost_probability_low", "lost_probability_high")
 
 
@@ -87,6 +89,10 @@ def rows(table: xr.Dataset) -> list[dict[str, object]]:
                         "limit_low": float(one["table_limit_low"]),
                         "limit_high": float(one["table_limit_high"]),
                         "status": LIMIT_STATUS[int(one["table_limit_status"])],
+                        "held_limit": float(one["table_held_limit"]),
+                        "held_limit_low": float(one["table_held_limit_low"]),
+                        "held_limit_high": float(one["table_held_limit_high"]),
+                        "held_status": LIMIT_STATUS[int(one["table_held_limit_status"])],
                     }
                 )
     return found
@@ -106,32 +112,39 @@ def text(table: xr.Dataset, heading: str) -> str:
     by_place = {
         (row["response"], row["failure_probability"], row["method"]): row for row in rows(table)
     }
-    body = []
-    for response in RESPONSES:
-        for level in table["failure_probability"].to_numpy():
-            cells = [by_place[response, float(level), METHODS[code]] for code in codes]
-            body.append(
-                [f"{response} [{RESPONSE_UNITS[response]}]", f"{level:g}", *map(_cell, cells)]
-            )
+
+    def body(prefix: str) -> list[list[str]]:
+        return [
+            [
+                f"{response} [{RESPONSE_UNITS[response]}]",
+                f"{level:g}",
+                *(_cell(by_place[response, float(level), METHODS[code]], prefix) for code in codes),
+            ]
+            for response in RESPONSES
+            for level in table["failure_probability"].to_numpy()
+        ]
+
     lost = [
         f"{float(p):.2g} [{float(low):.2g}, {float(high):.2g}]"
         for p, low, high in zip(*(table[f"table_{name}"] for name in _LOST), strict=True)
     ]
-    body.append(["levitation lost", "", *lost])
     notes = [table[f"table_{name}"].attrs["comment"] for name in ("limit", "lost_probability")]
     return (
-        f"# {heading}\n\nLimit [lower, upper end of its interval].\n\n{markdown(header, body)}\n"
+        f"# {heading}\n\nLimit [lower, upper end of its interval].  A passage that loses "
+        "levitation exceeds every limit.\n\n"
+        f"{markdown(header, [*body(''), ['levitation lost', '', *lost]])}\n"
+        "The same given that levitation holds.\n\n"
+        f"{markdown(header, body('held_'))}\n"
         f"Limits: {notes[0]}.\n\nLost levitation: {notes[1]}.\n"
     )
 
 
-def _cell(row: Mapping[str, object]) -> str:
-    if row["status"] == "infinite":
-        return (
-            f"none: losses are likelier (above {number(row['limit_low'])})"
-            if np.isfinite(float(str(row["limit_low"])))
-            else "none: losses are likelier"
-        )
-    if row["status"] != "given":
-        return str(row["status"]).replace("_", " ")
-    return f"{number(row['limit'])} [{number(row['limit_low'])}, {number(row['limit_high'])}]"
+def _cell(row: Mapping[str, object], prefix: str) -> str:
+    """A limit with its interval, or why there is none."""
+    status = row[f"{prefix}status"]
+    if status == "infinite":
+        return "none, losses are likelier"
+    if status != "given":
+        return str(status).replace("_", " ")
+    limit, low, high = (number(row[f"{prefix}limit{end}"]) for end in ("", "_low", "_high"))
+    return f"{limit} [{low}, {high}]"

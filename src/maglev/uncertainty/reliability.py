@@ -21,8 +21,9 @@ from maglev.uncertainty.samples import (
 FAILURE_PROBABILITIES = (1e-1, 1e-2, 1e-3)
 """Levels at which limits are given by default."""
 
-CARRIED = 10.0
-"""Expected exceedances that a sample needs to carry a level; fewer and no number is given."""
+CARRIED = 10
+"""Expected exceedances, to the nearest whole number, that a sample needs to carry a level; fewer
+and no number is given."""
 
 GIVEN, BEYOND_SAMPLE, LOST = "given", "beyond the sample", "exceeded by the lost samples"
 """What can be said of a limit: see ``Limits.status``."""
@@ -648,7 +649,7 @@ def _fewest_residuals(confidence: float) -> int:
 
 def _status(expected: FloatArray, lost: npt.NDArray[np.bool_]) -> tuple[str, ...]:
     return tuple(
-        LOST if none_finite else GIVEN if count * (1.0 + _ROUNDING) >= CARRIED else BEYOND_SAMPLE
+        LOST if none_finite else GIVEN if round(count) >= CARRIED else BEYOND_SAMPLE
         for count, none_finite in zip(expected, lost, strict=True)
     )
 
