@@ -226,3 +226,34 @@ def test_an_irregularity_file_shorter_than_the_run_is_refused(tmp_path):
         measured["car_body_acceleration_z"]
         != simulate(small(), MEAN[None])["car_body_acceleration_z"]
     )
+
+
+def test_every_sample_can_have_a_track_of_its_own():
+    config = small()
+    gains = np.tile(config.gains.as_row, (19, 1))
+    seeds = np.array([config.seed, *range(18)])
+    own = simulate(config, gains, track_seeds=seeds)
+    for name in ("girder_displacement_y", "car_body_acceleration_z"):
+        assert_array_equal(own[name][:1], simulate(config, gains[:1])[name])
+        later = simulate(config, gains[7:10], track_seeds=seeds[7:10], n_threads=2)
+        assert_array_equal(own[name][7:10], later[name])
+        assert np.unique(own[name]).size == 19
+    another = config.model_copy(update={"seed": 11})
+    assert_array_equal(
+        own.girder_acceleration_y[12], simulate(another, gains[:1]).girder_acceleration_y[0]
+    )
+
+
+@pytest.mark.parametrize(
+    ("seeds", "solver", "message"),
+    [
+        ([1], "production", r"track_seeds must be 2 whole numbers .* got int64 of shape \(1,\)"),
+        ([1.0, 2.0], "production", "track_seeds must be 2 whole numbers .* got float64"),
+        ([1, -2], "production", "from zero"),
+        ([1, 2], "reference", "the reference solver takes one track for all samples"),
+    ],
+)
+def test_seeds_of_tracks_are_checked(seeds, solver, message):
+    config = small()
+    with pytest.raises(ValueError, match=message):
+        simulate(config, [config.gains.as_row] * 2, solver=solver, track_seeds=seeds)

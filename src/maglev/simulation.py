@@ -10,14 +10,13 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from maglev import datasets
-from maglev.mechanics import integrate, reference
+from maglev import datasets, profiles
+from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import n_steps, time_step, track_range
 from maglev.mechanics.irregularity import Profile, profile
 from maglev.mechanics.responses import GIRDER_RESPONSES, Passages, checked_gains
 from maglev.parameters import Config
-from maglev.stages import profiles
 
 HISTORY_INTERVAL = 1e-3
 """Time between recorded rows of the histories, at most [s]; assumed: ten points in a period of the
@@ -30,6 +29,7 @@ def simulate(
     histories: bool = False,
     solver: Literal["production", "reference"] = "production",
     *,
+    track_seeds: npt.ArrayLike | None = None,
     n_threads: int = 1,
     on_progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
@@ -46,6 +46,8 @@ def simulate(
     solver
         ``"production"``: compiled, many samples at once; ``"reference"``: full finite elements,
         some hundred times slower.
+    track_seeds : (sample,)
+        Seed of each sample's irregularity; ``config.seed`` for all if not given.
     n_threads
         Rows of samples that the production solver runs at the same time; the numbers do not depend
         on it.
@@ -64,7 +66,8 @@ def simulate(
     ------
     ValueError
         If the gains have another shape or are not finite, the time step exceeds the stability
-        limit, the irregularity is shorter than the run, or the solver is unknown.
+        limit, the irregularity is shorter than the run, the solver is unknown, or the seeds are
+        not whole numbers from zero, one for each sample of the production solver.
     FileNotFoundError
         If the irregularity's file does not exist.
 
@@ -75,27 +78,34 @@ def simulate(
     gains = checked_gains(gains)
     if solver not in ("production", "reference"):
         raise ValueError(f"solver must be 'production' or 'reference', got {solver!r}")
+    seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
     every = max(1, int(HISTORY_INTERVAL / time_step(config) * (1 + 1e-9))) if histories else 0
     if solver == "production":
         passages = integrate.integrate(
             _system(config),
             gains,
+            profile_of=None if seeds is None else lambda k: track(config, seeds[k]),
             record_every=every,
             n_threads=n_threads,
             on_progress=on_progress,
         )
     else:
+        from maglev.mechanics import reference  # seldom needed
+
         passages, _ = reference.integrate(config, track(config), gains, record_every=every)
     return datasets.describe(_dataset(config, gains, passages, histories))
 
 
-def track(config: Config) -> Profile:
+def track(config: Config, seed: int | None = None) -> Profile:
     """Irregularity over all the track that the train sees.
 
     Parameters
     ----------
     config
         Parameters of everything.
+    seed
+        Of its phases; ``config.seed`` if not given.  A measured profile and a smooth track have
+        none.
 
     Raises
     ------
@@ -105,7 +115,23 @@ def track(config: Config) -> Profile:
     irregularity = config.irregularity
     name = irregularity.profile_file if irregularity.enabled else None
     measured = profiles.read(name) if name else None
-    return profile(irregularity, track_range(config), config.seed, measured)
+    chosen = config.seed if seed is None else seed
+    return profile(irregularity, track_range(config), chosen, measured)
+
+
+def _checked_seeds(track_seeds: npt.ArrayLike, n_samples: int, solver: str) -> list[int]:
+    seeds = np.asarray(track_seeds)
+    if seeds.shape != (n_samples,) or seeds.dtype.kind not in "iu" or (seeds < 0).any():
+        raise ValueError(
+            f"track_seeds must be {n_samples} whole numbers from zero, one for each sample, "
+            f"got {seeds.dtype} of shape {seeds.shape}"
+        )
+    if solver != "production":
+        raise ValueError(
+            "the reference solver takes one track for all samples; leave track_seeds out, "
+            "or take the production solver"
+        )
+    return [int(seed) for seed in seeds]
 
 
 @lru_cache(maxsize=2)

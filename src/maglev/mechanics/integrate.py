@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -51,6 +51,23 @@ Assumed: six times the highest frequency of the train; checked in the convergenc
 
 
 @dataclass(frozen=True)
+class Ground:
+    """Where poles of one kind can be after whole numbers of steps, and the sag of the rails there.
+
+    Attributes
+    ----------
+    x : (place,)
+        [m].
+    sag, sag_slope : (place, side)
+        Standing sag in the direction of the irregularity [m], and its derivative along travel [-].
+    """
+
+    x: Array
+    sag: Array
+    sag_slope: Array
+
+
+@dataclass(frozen=True)
 class System:
     """Everything a passage needs, as the kernels read it."""
 
@@ -61,6 +78,7 @@ class System:
     guidance: MagnetRows
     suspension_places: Places
     guidance_places: Places
+    grounds: tuple[Ground, Ground]
     line: Line
     config: Config
 
@@ -99,22 +117,21 @@ def prepare(config: Config, profile: Profile) -> System:
             f"got {time_step(config) * 1e3:.3g} ms; take a smaller step or lower "
             "passage.mode_cutoff"
         )
-    start, stop = track_range(config)
-    grid_stop = profile.x0 + profile.dx * (profile.values.shape[1] - 1)
-    if profile.x0 > start or grid_stop < stop:
-        raise ValueError(
-            f"the irregularity must reach from {start:.1f} m to {stop:.1f} m, "
-            f"got {profile.x0:.1f} m to {grid_stop:.1f} m"
-        )
+    _check_reach(config, profile)
     suspension, guidance = (_magnet_rows(train, guidance=kind) for kind in (False, True))
+    suspension_places, suspension_ground = _places(config, suspension, guideway, reduced)
+    guidance_places, guidance_ground = _places(config, guidance, guideway, reduced)
+    grounds = (suspension_ground, guidance_ground)
+    tracks = _tracks(config, grounds, [profile])
     return System(
         train=train,
         reduced=reduced,
         vehicle=_vehicle(train),
         suspension=suspension,
         guidance=guidance,
-        suspension_places=_places(config, suspension, profile, guideway, reduced),
-        guidance_places=_places(config, guidance, profile, guideway, reduced),
+        suspension_places=suspension_places._replace(rail=tracks[0][0], ramp=tracks[0][1]),
+        guidance_places=guidance_places._replace(rail=tracks[1][0], ramp=tracks[1][1]),
+        grounds=grounds,
         line=_line(reduced, time_step(config)),
         config=config,
     )
@@ -124,6 +141,7 @@ def integrate(
     system: System,
     gains: Array,
     *,
+    profile_of: Callable[[int], Profile] | None = None,
     record_every: int = 0,
     n_threads: int = 1,
     on_progress: Callable[[int], None] | None = None,
@@ -138,6 +156,9 @@ def integrate(
         From `prepare`.
     gains : (sample, 4)
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d.
+    profile_of
+        Track irregularity of a sample by its number; the one that ``system`` was prepared with if
+        not given.
     record_every
         Steps between recorded rows of the histories; zero records none.
     n_threads
@@ -166,12 +187,25 @@ def integrate(
     def one_row(row: int) -> Outcome:
         outcome = _empty_outcome(system, run)
         lanes = np.ascontiguousarray(padded[row * LANES : (row + 1) * LANES].T)
+        suspension_places, guidance_places = system.suspension_places, system.guidance_places
+        if profile_of is not None:
+            numbers = np.minimum(np.arange(row * LANES, (row + 1) * LANES), n_samples - 1)
+            profiles = {int(k): profile_of(int(k)) for k in np.unique(numbers)}
+            for profile in profiles.values():
+                _check_reach(system.config, profile)
+            of_kinds = _tracks(system.config, system.grounds, [profiles[int(k)] for k in numbers])
+            suspension_places, guidance_places = (
+                places._replace(rail=rail, ramp=ramp)
+                for places, (rail, ramp) in zip(
+                    (suspension_places, guidance_places), of_kinds, strict=True
+                )
+            )
         passage(
             system.vehicle,
             system.suspension,
             system.guidance,
-            system.suspension_places,
-            system.guidance_places,
+            suspension_places,
+            guidance_places,
             system.line,
             run,
             lanes,
@@ -353,11 +387,10 @@ def _stride(guideway: Guideway) -> int:
 def _places(
     config: Config,
     rows: MagnetRows,
-    profile: Profile,
     guideway: guideway_model.GuidewayModel,
     reduced: ReducedGuideway,
-) -> Places:
-    """Tabulate rail pieces and irregularity where the poles are after whole numbers of steps."""
+) -> tuple[Places, Ground]:
+    """Tabulate pieces of rail where the poles are after whole numbers of steps; no track yet."""
     advance = config.passage.speed * time_step(config)
     start = (rows.x[:, None] + rows.offset - config.passage.approach) / advance
     whole = np.floor(start + 1e-6)
@@ -373,19 +406,44 @@ def _places(
     first_coefficient, weight, slope = rail_weights(
         config.guideway, x - span * length, lateral=rows.is_guidance
     )
-    value, ramp = displacement(profile, x)
-    kind = slice(2, 4) if rows.is_guidance else slice(0, 2)
     sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x)
     apart = np.array([1.0, -1.0 if rows.is_guidance else 1.0])
-    speed = config.passage.speed
-    return Places(
+    nothing = np.zeros((x.size, 2, 1))
+    places = Places(
         number=number,
         base=np.where(on, span * _stride(config.guideway) + first_coefficient, -1),
         weight=np.where(on[:, None], weight, 0.0),
-        rise=np.where(on[:, None], slope * speed, 0.0),
-        rail=(value[kind].T + sag[:, None] * apart)[..., None],
-        ramp=((ramp[kind].T + sag_slope[:, None] * apart) * speed)[..., None],
+        rise=np.where(on[:, None], slope * config.passage.speed, 0.0),
+        rail=nothing,
+        ramp=nothing,
     )
+    return places, Ground(x=x, sag=sag[:, None] * apart, sag_slope=sag_slope[:, None] * apart)
+
+
+def _tracks(
+    config: Config, grounds: tuple[Ground, Ground], profiles: Sequence[Profile]
+) -> list[tuple[Array, Array]]:
+    """For each kind of pole what it meets at its places, and its rate (place, side, profile)."""
+    tracks = []
+    for ground, rows in zip(grounds, (slice(0, 2), slice(2, 4)), strict=True):
+        rail, ramp = np.empty((2, *ground.sag.shape, len(profiles)))
+        for k, profile in enumerate(profiles):
+            value, slope = displacement(profile, ground.x)
+            rail[..., k] = value[rows].T + ground.sag
+            ramp[..., k] = (slope[rows].T + ground.sag_slope) * config.passage.speed
+        tracks.append((rail, ramp))
+    return tracks
+
+
+def _check_reach(config: Config, profile: Profile) -> None:
+    """Refuse a profile that is shorter than the run."""
+    start, stop = track_range(config)
+    grid_stop = profile.x0 + profile.dx * (profile.values.shape[1] - 1)
+    if profile.x0 > start or grid_stop < stop:
+        raise ValueError(
+            f"the irregularity must reach from {start:.1f} m to {stop:.1f} m, "
+            f"got {profile.x0:.1f} m to {grid_stop:.1f} m"
+        )
 
 
 def _standing_sag(

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from scipy.signal import welch
 
+from maglev import profiles
 from maglev.mechanics.irregularity import (
     PROFILE_NAMES,
     displacement,
@@ -15,7 +16,6 @@ from maglev.mechanics.irregularity import (
     spectral_density,
 )
 from maglev.parameters import Config, Irregularity
-from maglev.stages import profiles
 
 _POINTS_PER_WAVELENGTH = 10  # of the shortest wavelength, in the file
 _SPECTRUM_LENGTH = 10  # length behind the spectra, in longest wavelengths: harmonics recur in 10

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from maglev import profiles
 from maglev.mechanics.irregularity import PROFILE_NAMES
-from maglev.stages import profiles
 
 X = np.array([0.0, 0.25, 0.5, 1.0])
 COLUMNS = {"x": X, "vertical": 1e-3 * X, "lateral": -2e-3 * X, "vertical_left": 3e-3 * X**2}
