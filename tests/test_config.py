@@ -106,7 +106,7 @@ ROOT = Path(__file__).parents[1]
         ),
         (
             "cases: {New: {}}",
-            "cases.'New' cannot name a case: use small letters, digits and underscores, and none "
+            "cases.New cannot name a case: use small letters, digits and underscores, and none "
             "of config, track, guideway, figures, tables, checks, report",
         ),
         (

@@ -1110,7 +1110,7 @@ class Config(Parameters):
         for name in cases:
             if not re.fullmatch(r"[a-z][a-z0-9_]*", str(name)) or name in _RESERVED:
                 raise ValueError(
-                    f"'{name}' cannot name a case: use small letters, digits and underscores, and "
+                    f"{name} cannot name a case: use small letters, digits and underscores, and "
                     f"none of {', '.join(_RESERVED)}"
                 )
         return {name: case for name, case in cases.items() if case is not None}

@@ -164,16 +164,16 @@ class _Design:
         changes: list[float] = []
         for number in itertools.count():
             path = self.folder / f"round_{number:03d}.nc"
+            after: Surrogate | None = None
             if not path.is_file():
                 if rounds and surrogate is None:
                     surrogate = self.fit(*state.training)
                 before = rounds[-1]["round_limit"].values[0] if rounds else None
-                self._make(number, path, state, surrogate, before, changes)
+                after = self._make(number, path, state, surrogate, before, changes)
             one = datasets.read(path, "round")
-            state = _absorbed(state, one)
+            state, surrogate = _absorbed(state, one), after
             changes.append(float(one["limit_change"].item()))
             decision = self._decision(state, changes)
-            surrogate = None
             if one.attrs["baseline"] != self.truth_hash:
                 surrogate = self.fit(*state.training)
                 one["rmse"] = (("round", "response"), self._rmse(surrogate))
@@ -202,8 +202,8 @@ class _Design:
         surrogate: Surrogate | None,
         limits_before: Array | None,
         changes: list[float],
-    ) -> None:
-        """Choose, run and judge the points of one round, and write it."""
+    ) -> Surrogate:
+        """Choose, run and judge the points of one round, and write it; the surrogate after it."""
         predicted: Array | None = None
         if surrogate is None:
             initial = self.points["initial"]
@@ -253,6 +253,7 @@ class _Design:
         )
         one.attrs["baseline"] = self.truth_hash
         datasets.write(one, path, "round", config=self.content, code=self.code)
+        return after
 
     def _chosen(
         self,

@@ -38,6 +38,12 @@ DECIDING = ("seed", "train", "guideway", "irregularity", "passage")
 """Sections of the configuration that decide a run, beside its gains."""
 
 
+@cache
+def _code() -> str:
+    """Fingerprint of the model as it is when a job first asks: an edit must not slip in later."""
+    return code_of("simulation")
+
+
 def content(config: Config) -> dict[str, object]:
     """All of a configuration that decides a run, beside its gains; files by their bytes."""
     whole = config.quantities()
@@ -56,7 +62,7 @@ def key_of(*parts: object) -> str:
 
 def folder_of(config: Config, store: str | Path) -> Path:
     """Folder of the store in which the runs of a configuration lie."""
-    return Path(store) / "runs" / key_of(content(config), code_of("simulation"))
+    return Path(store) / "runs" / key_of(content(config), _code())
 
 
 def _row_keys(gains: npt.NDArray[np.float64], seeds: npt.NDArray[np.int64] | None) -> list[bytes]:
@@ -171,8 +177,7 @@ def _compute(
         computed["track_seed"] = (("sample",), seeds)
     name = hashlib.sha256(b"".join(_row_keys(gains, seeds))).hexdigest()[:16]
     path = folder / f"{name}.nc"
-    code = code_of("simulation")
-    datasets.write(computed, path, "passage", config=content(config), code=code)
+    datasets.write(computed, path, "passage", config=content(config), code=_code())
     return path
 
 

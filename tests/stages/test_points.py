@@ -1,0 +1,67 @@
+"""Point sets of a case: as many as asked for, and the same whatever else is asked for."""
+
+import numpy as np
+import pytest
+from formula_train import config
+from numpy.testing import assert_allclose, assert_array_equal
+
+from maglev import datasets
+from maglev.config import from_mapping
+from maglev.stages import points
+
+
+def test_every_set_has_its_layout_and_its_size():
+    expected = {
+        "baseline": 20, "representative": 64, "osm": 30, "initial_asm_paper": 16,
+        "candidates_asm_paper": 200, "initial_asm": 24, "candidates_asm": 512,
+    }  # fmt: skip
+    assert set(points.SETS) == set(expected)
+    for name, n in expected.items():
+        one = points.dataset(config(), "validation", name)
+        datasets.check(datasets.describe(one), "points")
+        assert one.sizes == {"sample": n, "parameter": 4}
+        assert_allclose(one["probability"].sum(), 1.0, rtol=1e-12)
+
+
+def test_gains_that_are_not_random_stay_at_their_means():
+    one = points.dataset(config(), "only_guidance_proportional", "osm")
+    assert_array_equal(one["parameter"], [2])
+    assert_array_equal(one["suspension_proportional_gain"], np.full(30, 3500.0))
+    expected = 4500.0 * (1 + 0.1 * one["standard"].values[:, 0])
+    assert_allclose(one["guidance_proportional_gain"], expected, rtol=1e-14)
+    assert_allclose(one["standard"].std(), 1.0, atol=0.05)
+
+
+def test_the_first_design_of_one_gain_is_smaller():
+    assert points.dataset(config(), "only_guidance_proportional", "initial_asm").sizes == {
+        "sample": 12,
+        "parameter": 1,
+    }
+
+
+def test_a_sample_of_the_baseline_does_not_know_how_many_there_are():
+    parameters = config()
+    few = points.baseline(parameters, "validation", 10)
+    many = points.baseline(parameters, "validation", 1000)
+    assert_array_equal(many[:10], few)
+    assert_allclose(many.std(axis=0), 1.0, atol=0.1)
+    assert_array_equal(
+        points.track_seeds(parameters, 1000)[:10], points.track_seeds(parameters, 10)
+    )
+    assert np.unique(points.track_seeds(parameters, 1000)).size == 1000
+
+
+def test_cases_with_the_same_random_gains_have_the_same_standard_points():
+    wide = points.dataset(config(), "cov_014", "initial_asm")
+    narrow = points.dataset(config(), "cov_004", "initial_asm")
+    assert_allclose(wide["standard"], narrow["standard"], rtol=1e-9, atol=1e-9)
+    other_seed = from_mapping({"seed": 5, "study": {"n_counting": 16384}})
+    other = points.dataset(other_seed, "cov_004", "initial_asm")
+    assert np.abs(other["standard"].values[:24] - narrow["standard"].values).max() > 0.1
+
+
+def test_an_unknown_case_or_set_is_refused():
+    with pytest.raises(ValueError, match="there is no case 'al', known are: validation, only_"):
+        points.dataset(config(), "al", "osm")
+    with pytest.raises(ValueError, match="there is no point set 'lhs', known are: baseline"):
+        points.dataset(config(), "validation", "lhs")
