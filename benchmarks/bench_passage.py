@@ -33,7 +33,14 @@ from maglev import datasets, load_config, simulate
 from maglev.figures import style
 from maglev.fingerprint import code_of
 from maglev.mechanics import integrate, reference
-from maglev.mechanics._kernels import _line_acceleration, _links, _magnets, _project, _transform
+from maglev.mechanics._kernels import (
+    _gather,
+    _line_acceleration,
+    _links,
+    _magnets,
+    _project,
+    _transform,
+)
 from maglev.mechanics.course import n_steps, time_step
 from maglev.mechanics.lanes import LANES, load, store
 from maglev.parameters import Config
@@ -197,15 +204,24 @@ class Phase:
     seconds: float | None = None
 
 
-def spans_under_train(system: integrate.System) -> npt.NDArray[np.int64]:
-    """Steps (span,) of a passage in which the train is over a span, as the kernel tells it."""
-    config, line = system.config, system.line
-    nose = -config.passage.approach + config.passage.speed * time_step(config) * np.arange(
-        1, n_steps(config) + 1
-    )
-    first = np.maximum(0, np.floor((nose - config.train.length) / line.span_length))
-    last = np.minimum(line.n_spans - 1, np.floor(nose / line.span_length))
-    return np.array([int(((first <= j) & (j <= last)).sum()) for j in range(line.n_spans)])
+def noses(system: integrate.System) -> Array:
+    """Place of the nose at every step (step,) [m]."""
+    config = system.config
+    advance = config.passage.speed * time_step(config)
+    return -config.passage.approach + advance * np.arange(1, n_steps(config) + 1)
+
+
+def rail_under_train(system: integrate.System) -> Array:
+    """Share (span,) of a span's rail that a mean step moves: its units under the train [-]."""
+    line, nose = system.line, noses(system)
+    unit = line.span_length / line.n_units
+    shares = []
+    for span in range(line.n_spans):
+        tail = nose - system.config.train.length - span * line.span_length
+        begin = np.clip(np.floor(tail / unit - 1e-6), 0, line.n_units)
+        end = np.clip(np.floor((nose - span * line.span_length) / unit + 1e-6) + 1, 0, line.n_units)
+        shares.append(np.maximum(end - begin, 0).mean() / line.n_units)
+    return np.array(shares)
 
 
 def poles_on_guideway(system: integrate.System) -> tuple[int, float]:
@@ -235,7 +251,8 @@ def operations(system: integrate.System) -> dict[str, float]:
     # rails of a span: displacement and velocity of z, roll and y from the coordinates that are
     # felt, right and left from mean and roll; back: forces on all coordinates that move a rail
     rails = 0.0
-    shares = spans_under_train(system) / n_steps(system.config)
+    shares = rail_under_train(system)
+    moving = float((noses(system) >= 0).mean())  # until then the guideway rests
     for span, share in enumerate(shares):
         felt = line.upright_felt[span] - line.upright_start[span]
         felt += 2 * (line.sideways_felt[span] - line.sideways_start[span])
@@ -245,8 +262,8 @@ def operations(system: integrate.System) -> dict[str, float]:
     band, n_top = line.top_factor.shape[1], n_line - n_modes
     guideway = 2 * (2 * line.carried.size + line.stiffness.size + line.damping.size) + 2 * n_line
     guideway += 2 * sum(1 + 2 * min(band - 1, i) for i in range(n_top))
-    # states: x 4, predicted 2, half kicks 2 and 2; the train's forces over its masses 1
-    states = 11 * n_dof + 10 * n_line
+    # states: x 4, predicted 2, half kicks 2 and 2, fused; the train's forces over its masses 1
+    states = 12 * n_dof + 11 * n_line * moving
     # outputs: midspan z and y 4 a column, each section of the low-pass 9, size of a response 1
     n_sections = integrate._run(system.config, 0).sections.shape[0]
     outputs = 2 * (4 * line.output_column.size + 9 * n_sections) + 4 + 2 * vehicle.body_z.size
@@ -255,7 +272,7 @@ def operations(system: integrate.System) -> dict[str, float]:
         "poles: gap, current, force": poles,
         "poles: rail under them and force back": under_poles,
         "rails: from modes and back": rails,
-        "guideway: stiffness, damping, pier tops": guideway,
+        "guideway: stiffness, damping, pier tops": guideway * moving,
         "states: predict and kick": states,
         "outputs": outputs,
     }
@@ -274,7 +291,7 @@ def _repeat_line(n, line, x, velocity, relative, force):
 
 
 @njit
-def _repeat_rails(n, line, span, x, velocity, motion, motion_velocity, pull, roll, force):
+def _repeat_rails(n, line, span, x, velocity, motion, motion_velocity, pull, roll, packed, force):
     """What the passage does with the rails of one span in a step, there and back."""
     at = span * line.stride
     up, up_felt = line.upright_start[span], line.upright_felt[span]
@@ -283,9 +300,11 @@ def _repeat_rails(n, line, span, x, velocity, motion, motion_velocity, pull, rol
         for quantity in range(2):
             source = x if quantity == 0 else velocity
             target = motion if quantity == 0 else motion_velocity
-            _transform(line.rail_z, line.upright, up, up_felt, source, at, target[0])
-            _transform(line.rail_roll, line.sideways, out, out_felt, source, 0, roll)
-            _transform(line.rail_y, line.sideways, out, out_felt, source, at, target[2])
+            _gather(source, line.upright, up, up_felt, packed)
+            _transform(line.rail_z, up, up_felt, packed, 0, line.stride, target[0], at)
+            _gather(source, line.sideways, out, out_felt, packed)
+            _transform(line.rail_roll, out, out_felt, packed, 0, line.stride, roll, 0)
+            _transform(line.rail_y, out, out_felt, packed, 0, line.stride, target[2], at)
             for k in range(line.stride):
                 mean, turn = load(target[0], at + k), load(roll, k)
                 store(target[0], at + k, mean + turn)
@@ -295,16 +314,17 @@ def _repeat_rails(n, line, span, x, velocity, motion, motion_velocity, pull, rol
             store(pull[0], at + k, right + left)
             store(roll, k, right - left)
         up_end, out_end = line.upright_start[span + 1], line.sideways_start[span + 1]
-        _project(line.rail_z, line.upright, up, up_end, pull[0], at, force)
-        _project(line.rail_roll, line.sideways, out, out_end, roll, 0, force)
-        _project(line.rail_y, line.sideways, out, out_end, pull[2], at, force)
+        end = line.stride
+        _project(line.rail_z, line.upright, up, up_end, 0, end, pull[0], at, force)
+        _project(line.rail_roll, line.sideways, out, out_end, 0, end, roll, 0, force)
+        _project(line.rail_y, line.sideways, out, out_end, 0, end, pull[2], at, force)
 
 
 @njit
 def _every_step(stride, n, places, rows, gains, x, v, force, motion, rate, pull, outcome, magnet):
     for step in range(1, n + 1, stride):
         _magnets(
-            places, rows, step, gains, x, v, force, motion, rate, pull, outcome,
+            places, rows, step, gains, x, v, force, motion, rate, pull, False, outcome,
             magnet[0], magnet[1], magnet[2], magnet[3],
         )  # fmt: skip
 
@@ -323,6 +343,7 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     force, line_force, relative = np.zeros((n_dof, LANES)), *np.zeros((2, n_line, LANES))
     motion, rate, pull = 1e-5 * rng.standard_normal((3, 3, line.n_spans * line.stride, LANES))
     roll = np.zeros((line.stride, LANES))
+    packed = np.zeros((max(line.upright.size, line.sideways.size), LANES))
     magnet = np.zeros((4, system.train.magnets.x.size, LANES))
     run = integrate._run(system.config, 0)
     outcome = integrate._empty_outcome(system, run)
@@ -334,13 +355,14 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
 
     links = per_call(2000, lambda n: _repeat_links(n, system.vehicle, x, v, force))
     guideway = per_call(1000, lambda n: _repeat_line(n, line, line_x, line_v, relative, line_force))
-    shares = spans_under_train(system) / n_steps(system.config)
+    guideway *= float((noses(system) >= 0).mean())
+    shares = rail_under_train(system)
     rails = sum(
         share
         * per_call(
             1000,
             lambda n, span=span: _repeat_rails(
-                n, line, span, line_x, line_v, motion, rate, pull, roll, line_force
+                n, line, span, line_x, line_v, motion, rate, pull, roll, packed, line_force
             ),
         )
         for span, share in enumerate(shares)
