@@ -15,6 +15,21 @@ run: test
 train: {n_cars: 1}
 guideway: {n_spans: 1}
 irregularity: {n_harmonics: 50, wavelength_max: 20 m}
+study: {mcm: {n_samples: 4, chunk_size: 2}}
+cases:
+  validation: {n_spans: 1}
+  only_suspension_proportional: null
+  only_suspension_derivative: null
+  only_guidance_proportional: null
+  only_guidance_derivative: null
+  all_gains: null
+  cov_004: null
+  cov_006: null
+  cov_008: null
+  cov_010: null
+  cov_012: null
+  cov_014: {n_spans: 1}
+  random_track: {n_spans: 1, methods: [mcm], n_samples: 2, random_track: true}
 """
 
 
@@ -68,15 +83,30 @@ def drawn(tmp_path_factory):
 def test_a_dry_run_of_all_lists_every_step_of_the_method(fresh):
     jobs = fresh.would_run("all")
     assert jobs == {
-        "run_config": 1, "stage_config": 5, "irregularity": 1, "guideway_modes": 1, "passage": 1,
-        "deflection": 1, "dynamic_factor": 1, "fig7": 1, "fig8": 1, "histories": 1, "gaps": 1,
-        "modes": 1, "all": 1,
+        "run_config": 1, "stage_config": 14, "case_config": 11, "method_config": 4,
+        "irregularity": 1, "guideway_modes": 1, "passage": 1, "deflection": 1, "dynamic_factor": 1,
+        "points": 5, "adaptive_points": 3, "mcm_chunk": 3, "mcm": 2, "design": 4, "track_runs": 4,
+        "surrogate": 4, "eev": 4, "density": 4, "density_mcm": 2, "limits": 4, "limits_mcm": 2,
+        "accuracy": 1, "track_split": 1, "statistics": 1, "table1": 1, "paper_and_ours": 1,
+        "fig7": 1, "fig8": 1, "histories": 1, "gaps": 1, "modes": 1, "all": 1,
     }  # fmt: skip
     assert fresh.would_run() == jobs
 
 
 def test_a_single_figure_needs_only_its_own_chain(fresh):
     assert fresh.would_run("modes") == {"stage_config": 1, "guideway_modes": 1, "modes": 1}
+
+
+def test_a_single_case_and_method_needs_only_its_own_chain(fresh):
+    assert fresh.would_run("results/test/cov_014/asm/limits.nc") == {
+        "stage_config": 2, "case_config": 1, "method_config": 1, "adaptive_points": 1,
+        "design": 1, "surrogate": 1, "limits": 1,
+    }  # fmt: skip
+
+
+def test_the_truth_of_all_cases_is_a_target_of_its_own(fresh):
+    jobs = fresh.would_run("truth")
+    assert (jobs["mcm"], jobs["density_mcm"], jobs["statistics_truth"]) == (3, 3, 1)
 
 
 @pytest.mark.parametrize(
