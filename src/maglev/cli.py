@@ -186,7 +186,6 @@ def points(configs: tuple[Path, ...], case: str, sets: tuple[tuple[str, Path], .
 @main.command()
 @_config
 @_case
-@click.option("--points", "baseline", type=_File, required=True, help="Baseline's points.")
 @click.option("--start", type=click.IntRange(0), required=True, help="First sample.")
 @click.option("--stop", type=click.IntRange(1), required=True, help="Sample after the last.")
 @_store
@@ -195,7 +194,6 @@ def points(configs: tuple[Path, ...], case: str, sets: tuple[tuple[str, Path], .
 def runs(
     configs: tuple[Path, ...],
     case: str,
-    baseline: Path,
     start: int,
     stop: int,
     store: Path,
@@ -203,30 +201,33 @@ def runs(
     out: Path,
 ) -> None:
     """Run some samples of the baseline of a case, but for those that the store holds."""
-    from maglev import datasets
     from maglev.config import load_config
     from maglev.stages import runs, save
 
     parameters = load_config(*configs)
-    drawn = datasets.read(baseline, "points")
-    result = runs.chunk(parameters, case, drawn, range(start, stop), store, threads)
+    result = runs.chunk(parameters, case, range(start, stop), store, threads)
     save(result, out, "runs", parameters, _profile(parameters), case=case)
 
 
 @main.command()
 @_config
 @_case
+@click.option("--points", "baseline", type=_File, required=True, help="Points of the baseline.")
 @click.argument("chunks", type=_File, nargs=-1, required=True)
 @_out
-def gather(configs: tuple[Path, ...], case: str, chunks: tuple[Path, ...], out: Path) -> None:
+def gather(
+    configs: tuple[Path, ...], case: str, baseline: Path, chunks: tuple[Path, ...], out: Path
+) -> None:
     """Put the CHUNKS of a baseline together."""
     from maglev import datasets
     from maglev.config import load_config
     from maglev.stages import runs, save
 
     parameters = load_config(*configs)
-    result = runs.gather([datasets.read(path, "runs") for path in chunks])
-    save(result, out, "runs", parameters, _profile(parameters), case=case)
+    points = datasets.read(baseline, "points")
+    result = runs.gather(points, [datasets.read(path, "runs") for path in chunks])
+    inputs = {"points": baseline, **_profile(parameters)}
+    save(result, out, "runs", parameters, inputs, case=case)
 
 
 @main.command("track-runs")
@@ -245,7 +246,7 @@ def track_runs(
 
     parameters = load_config(*configs)
     result = runs.track_part(parameters, case, part, store, threads)
-    save(result, out, "runs.track", parameters, case=case)
+    save(result, out, "runs.track", parameters, _profile(parameters), case=case)
 
 
 @main.command()

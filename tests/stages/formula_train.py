@@ -74,10 +74,10 @@ def made(parameters, method, store, case="validation", baseline=None):
         drawn, size = points.dataset(parameters, case, "baseline"), parameters.study.mcm.chunk_size
         n = drawn.sizes["sample"]
         parts = [
-            runs.chunk(parameters, case, drawn, range(start, min(start + size, n)), store)
+            runs.chunk(parameters, case, range(start, min(start + size, n)), store)
             for start in range(0, n, size)
         ]
-        return runs.gather(parts)
+        return runs.gather(drawn, parts)
     sets = {"initial": "osm" if method == "osm" else f"initial_{method}"}
     if method != "osm":
         sets["candidates"] = f"candidates_{method}"

@@ -134,8 +134,8 @@ def test_parts_of_a_random_track_share_gains_and_tracks(train, tmp_path):
 
 def test_what_cannot_be_run_is_refused(train, tmp_path):
     drawn = points.dataset(config(), "validation", "baseline")
-    with pytest.raises(ValueError, match="samples 15 to 25 are not all among the 20"):
-        runs.chunk(config(), "validation", drawn, range(15, 25), tmp_path)
+    with pytest.raises(ValueError, match=r"samples must be numbered upwards from 0 or more, got"):
+        runs.chunk(config(), "validation", range(5, 5), tmp_path)
     with pytest.raises(ValueError, match=r"gains have shape \(0, 4\), expected \(sample, 4\)"):
         stored_runs(config(), np.empty((0, 4)), tmp_path)
     with pytest.raises(ValueError, match=r"track_seeds have shape \(2,\), expected \(sample,\)"):
@@ -144,7 +144,10 @@ def test_what_cannot_be_run_is_refused(train, tmp_path):
         runs.track_part(config(), "validation", "track_only", tmp_path)
     with pytest.raises(ValueError, match="part must be one of gains_only, track_only"):
         runs.track_part(config(), "moving", "both", tmp_path)
-    one = runs.chunk(config(), "validation", drawn, range(10, 20), tmp_path)
-    with pytest.raises(ValueError, match="the chunks must hold the samples 0 to 9 once each"):
-        runs.gather([one])
-    assert train.n_runs == 10
+    one = runs.chunk(config(), "validation", range(10, 20), tmp_path)
+    with pytest.raises(ValueError, match="the chunks must hold the samples 0 to 19 once each"):
+        runs.gather(drawn, [one])
+    whole = runs.chunk(config(), "validation", range(20), tmp_path)
+    with pytest.raises(ValueError, match="must have been run at the points of the baseline"):
+        runs.gather(drawn, [whole.assign(standard=whole["standard"] + 1e-9)])
+    assert train.n_runs == 20

@@ -33,8 +33,6 @@ def runs_of_all_cases() -> list[str]:
 rule mcm_chunk:
     input:
         config="<results>/{case}/config/runs.yaml",
-        # more samples leave those that there are as they are
-        points=ancient("<results>/{case}/points/baseline.nc"),
         profile=PROFILE,
     output:
         "<results>/{case}/mcm/chunk_{chunk}.nc",
@@ -56,7 +54,7 @@ rule mcm_chunk:
     message:
         "Run samples {params.start} to {params.stop} of the baseline of '{wildcards.case}'"
     shell:
-        "maglev runs --config {input.config} --case {wildcards.case} --points {input.points} "
+        "maglev runs --config {input.config} --case {wildcards.case} "
         "--start {params.start} --stop {params.stop} --store {params.store} "
         "--threads {threads} --out {output} 2> {log}"
 
@@ -64,6 +62,7 @@ rule mcm_chunk:
 rule mcm:
     input:
         config="<results>/{case}/config/runs.yaml",
+        points="<results>/{case}/points/baseline.nc",
         chunks=chunks,
     output:
         "<results>/{case}/mcm.nc",
@@ -78,8 +77,8 @@ rule mcm:
     message:
         "Put the baseline of '{wildcards.case}' together"
     shell:
-        "maglev gather --config {input.config} --case {wildcards.case} {input.chunks} "
-        "--out {output} 2> {log}"
+        "maglev gather --config {input.config} --case {wildcards.case} "
+        "--points {input.points} {input.chunks} --out {output} 2> {log}"
 
 
 rule track_runs:

@@ -248,12 +248,7 @@ def runs(
 
 
 def chunk(
-    config: Config,
-    case: str,
-    points: xr.Dataset,
-    rows: range,
-    store: str | Path,
-    n_threads: int = 1,
+    config: Config, case: str, rows: range, store: str | Path, n_threads: int = 1
 ) -> xr.Dataset:
     """Some runs of the baseline of a case.
 
@@ -263,10 +258,8 @@ def chunk(
         The configuration.
     case
         Name of the case.
-    points
-        Layout ``points``: the baseline.
     rows
-        Numbers of the samples.
+        Numbers of the samples, rising by one; how many the baseline has plays no part.
     store
         Folder of the store.
     n_threads
@@ -276,24 +269,22 @@ def chunk(
     -------
     dataset
         Layout ``runs``, with ``track_seed`` if the case has a random track; each sample under its
-        number in the baseline.
+        number in the baseline, all equally likely.
 
     Raises
     ------
     ValueError
-        If the baseline has no such samples, or as `stored_runs`.
+        If there are no such samples, or as `stored_runs`.
     """
-    n = points.sizes["sample"]
-    if not rows or rows[-1] >= n:
-        raise ValueError(
-            f"samples {rows.start} to {rows.stop} are not all among the {n} of '{case}'"
-        )
-    some = points.isel(sample=list(rows))
-    seeds = track_seeds(config, n)[list(rows)] if case_of(config, case).random_track else None
+    if not rows or rows.start < 0 or rows.step != 1:
+        raise ValueError(f"samples must be numbered upwards from 0 or more, got {rows}")
+    seeds = None
+    if case_of(config, case).random_track:
+        seeds = track_seeds(config, rows.stop)[rows.start :]
     result = runs(
         config,
         case,
-        some["standard"].values,
+        baseline(config, case, rows.stop)[rows.start :],
         np.full(len(rows), 1.0 / len(rows)),
         store,
         track_seeds=seeds,
@@ -302,11 +293,13 @@ def chunk(
     return result.assign_coords(sample=np.array(rows))
 
 
-def gather(chunks: Sequence[xr.Dataset]) -> xr.Dataset:
+def gather(points: xr.Dataset, chunks: Sequence[xr.Dataset]) -> xr.Dataset:
     """Put the chunks of a baseline together.
 
     Parameters
     ----------
+    points
+        Layout ``points``: the baseline.
     chunks
         Layout ``runs``, in order.
 
@@ -318,7 +311,7 @@ def gather(chunks: Sequence[xr.Dataset]) -> xr.Dataset:
     Raises
     ------
     ValueError
-        If a sample is missing or stands twice.
+        If a sample is missing, stands twice or was run at another point.
     """
     whole = xr.concat(
         chunks,
@@ -328,11 +321,13 @@ def gather(chunks: Sequence[xr.Dataset]) -> xr.Dataset:
         compat="override",
         combine_attrs="override",
     )
-    n = whole.sizes["sample"]
+    n = points.sizes["sample"]
     if not np.array_equal(whole["sample"], np.arange(n)):
         raise ValueError(f"the chunks must hold the samples 0 to {n - 1} once each, in order")
+    if not np.array_equal(whole["standard"], points["standard"]):
+        raise ValueError("the chunks must have been run at the points of the baseline; do it again")
     whole.attrs = {name: chunks[0].attrs[name] for name in ("time_step", "n_steps")}
-    whole["probability"] = (("sample",), np.full(n, 1.0 / n))
+    whole["probability"] = (("sample",), points["probability"].values)
     return whole
 
 
