@@ -112,6 +112,25 @@ def test_exceedance_lies_in_its_interval_and_falls(held, losing):
             assert (files["density"][name].diff("cell") <= 1e-12).all(), name
         assert (files["density"]["exceedance_low"] <= files["density"]["exceedance"]).all()
         assert (files["density"]["exceedance_high"] >= files["density"]["exceedance"]).all()
+        imperfect = files["density"].isel(response=5)  # its surrogate errs to both sides
+        assert float((imperfect["exceedance"] - imperfect["exceedance_low"]).max()) > 1e-3
+        assert float((imperfect["exceedance_high"] - imperfect["exceedance"]).max()) > 1e-3
+
+
+def test_points_that_are_likely_lost_are_not_in_a_density(losing):
+    found = losing["density"].isel(response=0)
+    truncated = norm.pdf(BORDER) / norm.sf(BORDER)  # mean of the first coordinate that held
+    assert_allclose(found["mean"], 1.5e-3 + 6e-6 * truncated, atol=2e-7)
+
+
+def test_the_interval_of_a_limit_is_made_of_the_errors_near_it():
+    predictions = np.random.default_rng(8).standard_normal(20_000)
+    training = np.linspace(-3.0, 3.0, 200)
+    size = np.where(training > 1.9, 0.5, 0.01)
+    residuals = size * np.where(np.arange(200) % 2, 1.0, -1.0)
+    found = limits._surrogate_limits(CONFIG, predictions, training, residuals, {})
+    half = 0.5 * (found.upper - found.lower)
+    assert half[0] < 0.1 and half[2] > 0.5
 
 
 def test_limits_of_a_surrogate_are_those_of_the_formula(held):
