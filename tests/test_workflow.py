@@ -158,3 +158,55 @@ def test_a_value_reruns_only_the_stages_that_read_it(drawn):
     path.write_text(CONFIG + "seed: 5\n")
     assert drawn.would_run("fig7") == {"stage_config": 1, "irregularity": 1, "fig7": 1}
     path.write_text(CONFIG)
+
+
+MCM = "results/test/validation/mcm.nc"
+
+
+@pytest.fixture(scope="module")
+def counted(tmp_path_factory):
+    """A workplace in which the baseline was run, four samples in two chunks."""
+    workplace = Workplace(tmp_path_factory.mktemp("counted"))
+    code, text = workplace.snakemake(MCM, "--cores", "1")
+    assert code == 0, text
+    return workplace
+
+
+def test_a_larger_baseline_leaves_finished_chunks_alone(counted):
+    assert counted.would_run(MCM) == {}
+    path = counted.folder / "config" / "test.yaml"
+    path.write_text(CONFIG.replace("n_samples: 4", "n_samples: 6"))
+    assert counted.would_run(MCM) == {"case_config": 1, "points": 1, "mcm_chunk": 1, "mcm": 1}
+    path.write_text(CONFIG)
+
+
+def test_a_baseline_follows_what_decides_it_and_nothing_else(counted):
+    path = counted.folder / "config" / "test.yaml"
+    path.write_text(CONFIG.replace("study: {", "study: {asm: {n_largest: 80}, "))
+    assert counted.would_run(MCM) == {}
+    path.write_text(CONFIG + "passage: {speed: 400 km/h}\n")
+    assert counted.would_run(MCM) == {"case_config": 1, "mcm_chunk": 2, "mcm": 1}
+    path.write_text(CONFIG)
+
+
+def test_other_code_reruns_all_that_stands_on_it_at_once(counted):
+    path = counted.folder / "src" / "maglev" / "parameters.py"
+    text = path.read_text()
+    path.write_text(text + "\nEXTRA = 1\n")
+    assert counted.would_run(MCM) == {"points": 1, "mcm_chunk": 2, "mcm": 1}
+    path.write_text(text)
+
+
+def test_the_store_outlives_its_results_until_it_is_purged(counted):
+    store = counted.folder / "results" / ".store" / "test"
+    stored = sorted(path.name for path in store.rglob("*.nc"))
+    assert len(stored) == 2
+    (counted.folder / MCM).unlink()
+    code, text = counted.snakemake(MCM, "--cores", "1", "--forcerun", "mcm_chunk")
+    assert code == 0, text
+    assert sorted(path.name for path in store.rglob("*.nc")) == stored
+    log = counted.folder / "logs" / "test" / "validation" / "mcm" / "chunk_000.log"
+    assert "2 runs found, none to do" in log.read_text()
+    code, text = counted.snakemake("purge", "--cores", "1")
+    assert code == 0, text
+    assert not store.exists()
