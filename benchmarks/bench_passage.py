@@ -248,16 +248,14 @@ def operations(system: integrate.System) -> dict[str, float]:
     poles = 19 * n_poles + 12 * n_magnets
     # rail under a pole: 4 coefficients in error, twice in its rate, and in the force back, fused
     under_poles = 4 * (3 * 2 + 2) * n_on
-    # rails of a span: displacement and velocity of z, roll and y from the coordinates that are
-    # felt, right and left from mean and roll; back: forces on all coordinates that move a rail
+    # rails of a span: displacement and velocity of z, roll and y from the coordinates that move
+    # them, right and left from mean and roll; back: forces on those coordinates
     rails = 0.0
     shares = rail_under_train(system)
     moving = float((noses(system) >= 0).mean())  # until then the guideway rests
     for span, share in enumerate(shares):
-        felt = line.upright_felt[span] - line.upright_start[span]
-        felt += 2 * (line.sideways_felt[span] - line.sideways_start[span])
         moved = np.diff(line.upright_start)[span] + 2 * np.diff(line.sideways_start)[span]
-        rails += share * line.stride * (2 * (2 * felt + 2) + 2 + 2 * moved) + share * 3 * moved
+        rails += share * line.stride * (2 * (2 * moved + 2) + 2 + 2 * moved)
     # guideway: relative rates and their forces back, stiffness, damping, exact step, pier tops
     band, n_top = line.top_factor.shape[1], n_line - n_modes
     guideway = 2 * (2 * line.carried.size + line.stiffness.size + line.damping.size) + 2 * n_line
@@ -294,17 +292,17 @@ def _repeat_line(n, line, x, velocity, relative, force):
 def _repeat_rails(n, line, span, x, velocity, motion, motion_velocity, pull, roll, packed, force):
     """What the passage does with the rails of one span in a step, there and back."""
     at = span * line.stride
-    up, up_felt = line.upright_start[span], line.upright_felt[span]
-    out, out_felt = line.sideways_start[span], line.sideways_felt[span]
+    up, up_end = line.upright_start[span], line.upright_start[span + 1]
+    out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
     for _ in range(n):
         for quantity in range(2):
             source = x if quantity == 0 else velocity
             target = motion if quantity == 0 else motion_velocity
-            _gather(source, line.upright, up, up_felt, packed)
-            _transform(line.rail_z, up, up_felt, packed, 0, line.stride, target[0], at)
-            _gather(source, line.sideways, out, out_felt, packed)
-            _transform(line.rail_roll, out, out_felt, packed, 0, line.stride, roll, 0)
-            _transform(line.rail_y, out, out_felt, packed, 0, line.stride, target[2], at)
+            _gather(source, line.upright, up, up_end, packed)
+            _transform(line.rail_z, up, up_end, packed, 0, line.stride, target[0], at)
+            _gather(source, line.sideways, out, out_end, packed)
+            _transform(line.rail_roll, out, out_end, packed, 0, line.stride, roll, 0)
+            _transform(line.rail_y, out, out_end, packed, 0, line.stride, target[2], at)
             for k in range(line.stride):
                 mean, turn = load(target[0], at + k), load(roll, k)
                 store(target[0], at + k, mean + turn)
@@ -313,7 +311,6 @@ def _repeat_rails(n, line, span, x, velocity, motion, motion_velocity, pull, rol
             right, left = load(pull[0], at + k), load(pull[1], at + k)
             store(pull[0], at + k, right + left)
             store(roll, k, right - left)
-        up_end, out_end = line.upright_start[span + 1], line.sideways_start[span + 1]
         end = line.stride
         _project(line.rail_z, line.upright, up, up_end, 0, end, pull[0], at, force)
         _project(line.rail_roll, line.sideways, out, out_end, 0, end, roll, 0, force)

@@ -772,7 +772,7 @@ class Passage(Parameters):
         "Hz",
         "highest mode of the middle span, where responses are taken, in the production solver; "
         "damping is a share of critical up to here",
-        500,
+        300,
         source="D",
         confidence="M",
         above=0,

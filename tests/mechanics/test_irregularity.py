@@ -224,6 +224,6 @@ def test_an_empty_range_is_refused(length_range):
 
 
 def test_places_outside_the_grid_are_refused():
-    with pytest.raises(ValueError, match=r"range -200.006 to 800.007 m, got 0 to 800.1 m"):
+    with pytest.raises(ValueError, match=r"range -200.021 to 800.022 m, got 0 to 800.1 m"):
         displacement(LINE, [0.0, 800.1])
     assert_allclose(displacement(LINE, grid(LINE)[-1])[0], LINE.values[:, -1], rtol=1e-9)

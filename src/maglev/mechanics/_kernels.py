@@ -58,10 +58,8 @@ class Line(NamedTuple):
     stride: int  # rows of rail coefficients a span
     n_units: int  # units of rail a span, each with as many rows, an even number
     upright_start: np.ndarray  # (span + 1,)
-    upright_felt: np.ndarray  # (span,) end of those slow enough for a magnet to feel
     upright: np.ndarray  # coordinates that move a span's rails up and down
     sideways_start: np.ndarray  # (span + 1,)
-    sideways_felt: np.ndarray  # (span,)
     sideways: np.ndarray  # coordinates that roll a span or move it sideways
     rail_z: np.ndarray  # (upright, stride)
     rail_roll: np.ndarray  # (sideways, stride)
@@ -81,6 +79,8 @@ class Line(NamedTuple):
     output_column: np.ndarray  # (output column,) coordinates that move midspan
     midspan: np.ndarray  # (2, output column) z and y
     midspan_acceleration: np.ndarray  # (2, output column) the same per stepped acceleration
+    middle: int  # span that midspan is of
+    rest: np.ndarray  # (3, stride) midspan z by z, y by roll and y of its left-out modes [m/N]
 
 
 class Places(NamedTuple):
@@ -405,7 +405,7 @@ def passage(
     n_cars = vehicle.body_z.size
     n_magnets = 2 * (suspension.x.size + guidance.x.size)
     dt = run.time_step
-    half, half_square = 0.5 * dt, 0.5 * dt * dt
+    half, half_square, per_square = 0.5 * dt, 0.5 * dt * dt, 1.0 / (dt * dt)
     x = np.zeros((n_dof, LANES))
     velocity = np.zeros((n_dof, LANES))  # at the middle of the step
     predicted = np.zeros((n_dof, LANES))
@@ -426,6 +426,7 @@ def passage(
     magnet_max = np.zeros((n_magnets, LANES))
     magnet_gap = np.zeros((n_magnets, LANES))
     magnet_current = np.zeros((n_magnets, LANES))
+    left_out = np.zeros((4, LANES))  # motion of midspan by left-out modes, its last change; z, y
     n_sections = run.sections.shape[0]
     filtered = np.zeros((4 * n_sections, LANES))
     for step in range(1, run.n_steps + 1):
@@ -452,16 +453,16 @@ def passage(
         for span in range(first, last + 1):
             at = span * stride
             begin, end = _covered(line, span, nose - run.train_length, nose)
-            up, up_felt = line.upright_start[span], line.upright_felt[span]
-            out, out_felt = line.sideways_start[span], line.sideways_felt[span]
+            up, up_end = line.upright_start[span], line.upright_start[span + 1]
+            out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
             for quantity in range(2):
                 source = line_x if quantity == 0 else line_predicted
                 target = rail_motion if quantity == 0 else rail_velocity
-                _gather(source, line.upright, up, up_felt, packed)
-                _transform(line.rail_z, up, up_felt, packed, begin, end, target[0], at)
-                _gather(source, line.sideways, out, out_felt, packed)
-                _transform(line.rail_roll, out, out_felt, packed, begin, end, roll, 0)
-                _transform(line.rail_y, out, out_felt, packed, begin, end, target[2], at)
+                _gather(source, line.upright, up, up_end, packed)
+                _transform(line.rail_z, up, up_end, packed, begin, end, target[0], at)
+                _gather(source, line.sideways, out, out_end, packed)
+                _transform(line.rail_roll, out, out_end, packed, begin, end, roll, 0)
+                _transform(line.rail_y, out, out_end, packed, begin, end, target[2], at)
                 for k in range(begin, end):
                     mean, turn = load(target[0], at + k), load(roll, k)
                     store(target[0], at + k, mean + turn)
@@ -480,6 +481,8 @@ def passage(
             rail_velocity, rail_force, record, outcome, magnet_min, magnet_max, magnet_gap,
             magnet_current,
         )  # fmt: skip
+        rest_z = load(left_out, 0) * 0.0
+        rest_y = rest_z
         for span in range(first, last + 1):
             at = span * stride
             up, up_end = line.upright_start[span], line.upright_start[span + 1]
@@ -494,6 +497,11 @@ def passage(
             _project(line.rail_z, line.upright, up, up_end, begin, end, force_z, at, out_of)
             _project(line.rail_roll, line.sideways, out, out_end, begin, end, roll, 0, out_of)
             _project(line.rail_y, line.sideways, out, out_end, begin, end, force_y, at, out_of)
+            if span == line.middle:
+                for k in range(begin, end):
+                    rest_z = fma(load(force_z, at + k), line.rest[0, k], rest_z)
+                    rest_y = fma(load(roll, k), line.rest[1, k], rest_y)
+                    rest_y = fma(load(force_y, at + k), line.rest[2, k], rest_y)
         if reached:
             _line_acceleration(line, line_x, line_predicted, line_relative, line_acceleration)
         row = step // run.record_every - 1 if record else 0
@@ -506,7 +514,18 @@ def passage(
                 raw = fma(
                     load(line_acceleration, column), line.midspan_acceleration[direction, k], raw
                 )
-            smooth = raw
+            # What left-out modes add follows the forces at once; its acceleration is that of the
+            # step before, which the band does not see.
+            rest = rest_z if direction == 0 else rest_y
+            last_rest, last_change = (
+                load(left_out, 2 * direction),
+                load(left_out, 2 * direction + 1),
+            )
+            change = rest - last_rest
+            store(left_out, 2 * direction, rest)
+            store(left_out, 2 * direction + 1, change)
+            shift = shift + rest
+            smooth = fma(change - last_change, per_square, raw)
             for section in range(n_sections):
                 b0, b1, b2, _, a1, a2 = run.sections[section]
                 at = 2 * (direction * n_sections + section)

@@ -45,10 +45,6 @@ DAMPING_MARGIN = 1.4
 """Damping ratio of a component mode on its own over that of the guideway's modes, at most [-];
 measured 1.25 with the default parameters."""
 
-FELT_FREQUENCY = 400.0
-"""Guideway modes above it do not move the gaps [Hz]; they are driven by the poles all the same.
-Assumed: six times the highest frequency of the train; checked in the convergence table."""
-
 
 @dataclass(frozen=True)
 class Ground:
@@ -461,7 +457,12 @@ def _standing_sag(
     for span in range(n_spans):
         inside = np.flatnonzero((x >= span * length) & (x < (span + 1) * length))
         places, of_span, its_slope = standing_sag(
-            guideway, reduced, span, force, magnet.pole_pitch, lateral=rows.is_guidance
+            guideway,
+            reduced,
+            span,
+            force,
+            magnet.pole_pitch,
+            lateral=rows.is_guidance,
         )
         at = x[inside] - span * length
         sag[inside] = np.interp(at, places, of_span)
@@ -472,33 +473,28 @@ def _standing_sag(
 def _line(reduced: ReducedGuideway, time_step: float) -> Line:
     """Guideway for the kernels."""
     columns = reduced.span_coordinates
-    omega = np.zeros(reduced.n_coordinates)  # pier tops first
-    omega[: reduced.n_modes] = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes])
     least = 1e-9 * max(np.abs(z).max() for z in reduced.rail_z)
 
     def moving(*shapes: Array) -> list[IntArray]:
-        """Columns of each span that move its rails, the slow ones first."""
-        chosen = []
-        for column, *shape in zip(columns, *shapes, strict=True):
-            which = np.flatnonzero(sum(np.abs(one).max(axis=1) for one in shape) > least)
-            chosen.append(which[np.argsort(omega[column[which]], kind="stable")])
-        return chosen
+        """Columns of each span that move its rails."""
+        return [
+            np.flatnonzero(sum(np.abs(one).max(axis=1) for one in shape) > least)
+            for shape in zip(*shapes, strict=True)
+        ]
 
     def stacked(shapes: tuple[Array, ...], chosen: list[IntArray]) -> Array:
         rows = [shape[which] for shape, which in zip(shapes, chosen, strict=True)]
         return np.concatenate(rows)
 
-    def numbered(chosen: list[IntArray]) -> tuple[IntArray, IntArray, IntArray]:
-        """Start of each span, end of what its magnets feel, and the coordinates."""
+    def numbered(chosen: list[IntArray]) -> tuple[IntArray, IntArray]:
+        """Start of each span, and the coordinates."""
         numbers = [column[which] for column, which in zip(columns, chosen, strict=True)]
-        start = np.concatenate([[0], np.cumsum([number.size for number in numbers])])
-        slow = [int((omega[number] <= 2 * np.pi * FELT_FREQUENCY).sum()) for number in numbers]
-        return start, start[:-1] + slow, np.concatenate(numbers)
+        return np.cumsum([0, *(number.size for number in numbers)]), np.concatenate(numbers)
 
     upright = moving(reduced.rail_z)
     sideways = moving(reduced.rail_roll, reduced.rail_y)
-    upright_start, upright_felt, upright_column = numbered(upright)
-    sideways_start, sideways_felt, sideways_column = numbered(sideways)
+    upright_start, upright_column = numbered(upright)
+    sideways_start, sideways_column = numbered(sideways)
     response = step_response(reduced, time_step)
     damping = reduced.relative_damping.copy()
     phase = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes]) * time_step
@@ -522,10 +518,8 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
         stride=_stride(reduced.parameters),
         n_units=reduced.parameters.rail.units_per_span,
         upright_start=upright_start,
-        upright_felt=upright_felt,
         upright=upright_column,
         sideways_start=sideways_start,
-        sideways_felt=sideways_felt,
         sideways=sideways_column,
         rail_z=stacked(reduced.rail_z, upright),
         rail_roll=stacked(reduced.rail_roll, sideways),
@@ -545,6 +539,8 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
         output_column=columns[middle],
         midspan=midspan,
         midspan_acceleration=midspan / response[columns[middle]],
+        middle=middle,
+        rest=np.stack([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
     )
 
 

@@ -110,6 +110,8 @@ def profile(
     random = irregularity.enabled and measured is None
     dx, period = _grid(irregularity) if random else (_coarse(irregularity), 0)
     first, last = math.floor(start / dx), math.ceil(end / dx)
+    if random:  # the spacing has no end, so an end of the range may fall beside its point
+        first, last = first - 1, last + 1
     x = np.arange(first, last + 1) * dx
     if not irregularity.enabled:
         zeros = np.zeros((len(PROFILE_NAMES), x.size))

@@ -56,6 +56,9 @@ class ReducedGuideway:
         connector spacing, at the nodes of each unit, its ends and connectors.
     midspan_z, midspan_y : (column,)
         Motion of the middle span's girder axis at midspan per unit coordinate.
+    rest_z, rest_roll, rest_y : (coefficient,)
+        Motion of midspan, z under forces on ``rail_z`` and y under those on ``rail_roll`` and
+        ``rail_y`` of the middle span, that its modes leave out [m/N].
     basis : (dof, coordinate)
         Motion of the finite-element model per unit coordinate.
     """
@@ -72,6 +75,9 @@ class ReducedGuideway:
     rail_y: tuple[Array, ...]
     midspan_z: Array
     midspan_y: Array
+    rest_z: Array
+    rest_roll: Array
+    rest_y: Array
     basis: sp.csr_array
 
     @property
@@ -270,10 +276,20 @@ def reduce(
         rail_y=tuple(pieces[kind][2] for kind in kinds),
         midspan_z=at_midspan[0],
         midspan_y=at_midspan[1],
+        rest_z=np.empty(0),
+        rest_roll=np.empty(0),
+        rest_y=np.empty(0),
         basis=basis,
     )
     bearings = (basis.T @ model.bearing_damping @ basis).toarray()
-    return replace(reduced, relative_damping=_relative_damping(reduced, bearings, cutoff))
+    rest_z, rest_roll, rest_y = _rest_at_midspan(model, reduced)
+    return replace(
+        reduced,
+        relative_damping=_relative_damping(reduced, bearings, cutoff),
+        rest_z=rest_z,
+        rest_roll=rest_roll,
+        rest_y=rest_y,
+    )
 
 
 def _component_modes(model: full.GuidewayModel, dof: npt.NDArray[np.int64], cutoff: float) -> Array:
@@ -367,13 +383,10 @@ def _relative_damping(reduced: ReducedGuideway, bearings: Array, cutoff: float) 
     return _pruned(sp.csr_array((relative + relative.T) / 2), DAMPING_DROP)
 
 
-def _rail_pieces(
-    model: full.GuidewayModel,
-    basis: sp.csr_array,
-    span: int,
-    columns: npt.NDArray[np.int64],
-) -> tuple[Array, Array, Array]:
-    """Coefficients (column, coefficient) of the rails' z, roll and y along one span."""
+def _rail_nodes_rows(
+    model: full.GuidewayModel, span: int
+) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
+    """Rows (coefficient, dof) that read z, roll and y at the nodes of a span's rails."""
     rail, length = model.parameters.rail, model.parameters.span_length
     n_connectors = rail.connectors_per_unit
     spacing = length / (rail.units_per_span * n_connectors)
@@ -381,18 +394,45 @@ def _rail_pieces(
     nodes[-1] -= 1e-9  # just before the joint
     units = n_connectors * np.arange(rail.units_per_span)[:, None]
     x = span * length + spacing * (units + nodes).ravel()
-    right_z, _, right_y, _ = model.rail_rows(x, 1)
-    left_z, _, left_y, _ = model.rail_rows(x, -1)
-    right_turn_z, right_turn_y = model.rail_section_rows(x, 1)
-    left_turn_z, left_turn_y = model.rail_section_rows(x, -1)
+    in_order = np.arange(2 * x.size).reshape(2, -1).T.ravel()  # a node's displacement, its turn
+
+    def of_side(side: int) -> tuple[sp.csr_array, sp.csr_array]:
+        z, _, y, _ = model.rail_rows(x, side)
+        turn_z, turn_y = model.rail_section_rows(x, side)
+        both = (sp.vstack([z, turn_z * spacing]), sp.vstack([y, turn_y * spacing]))
+        return both[0].tocsr()[in_order], both[1].tocsr()[in_order]
+
+    (right_z, right_y), (left_z, left_y) = of_side(1), of_side(-1)
+    return (right_z + left_z) / 2, (right_z - left_z) / 2, (right_y + left_y) / 2
+
+
+def _rest_at_midspan(
+    model: full.GuidewayModel, reduced: ReducedGuideway
+) -> tuple[Array, Array, Array]:
+    """How left-out modes of the middle span move midspan under forces on its rails [m/N].
+
+    z under the coefficients of z, y under those of roll and of y.
+    """
+    middle = model.parameters.n_spans // 2
+    dof, own = model.span_dof[middle], reduced.own_modes(middle)
+    shapes = reduced.basis[dof][:, own].toarray()
+    square = reduced.stiffness.diagonal()[own]
+    factors = scipy.sparse.linalg.splu(model.stiffness[dof][:, dof].tocsc())
+    at = np.array([(middle + 0.5) * model.parameters.span_length])
+    rests = []
+    for row in model.girder_rows(at):
+        here = row[:, dof].toarray().ravel()
+        rests.append(factors.solve(here) - shapes @ (shapes.T @ here / square))
+    z, roll, y = (rows[:, dof] for rows in _rail_nodes_rows(model, middle))
+    return z @ rests[0], roll @ rests[1], y @ rests[1]
+
+
+def _rail_pieces(
+    model: full.GuidewayModel,
+    basis: sp.csr_array,
+    span: int,
+    columns: npt.NDArray[np.int64],
+) -> tuple[Array, Array, Array]:
+    """Coefficients (column, coefficient) of the rails' z, roll and y along one span."""
     shapes = basis[:, columns].toarray()
-
-    def coefficients(value: sp.csr_array, turn: sp.csr_array) -> Array:
-        ends = np.stack([value @ shapes, turn @ shapes * spacing], axis=1)
-        return ends.reshape(-1, columns.size).T / 2
-
-    return (
-        coefficients(right_z + left_z, right_turn_z + left_turn_z),
-        coefficients(right_z - left_z, right_turn_z - left_turn_z),
-        coefficients(right_y + left_y, right_turn_y + left_turn_y),
-    )
+    return tuple((rows @ shapes).T for rows in _rail_nodes_rows(model, span))
