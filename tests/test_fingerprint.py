@@ -39,3 +39,15 @@ def test_comments_docstrings_and_other_modules_do_not_change_it(package):
 def test_an_unknown_module_is_refused(package):
     with pytest.raises(ValueError, match=r"there is no module maglev\.nowhere"):
         fingerprint.code_of("nowhere")
+
+
+def test_a_module_left_out_takes_with_it_what_only_it_imports():
+    whole, part = (
+        fingerprint.standing_on("simulation"),
+        fingerprint.standing_on("simulation", without=["datasets"]),
+    )
+    assert {"maglev.datasets", "maglev.mechanics._kernels"} <= set(whole)
+    assert "maglev.datasets" not in part and "maglev.mechanics._kernels" in part
+    assert fingerprint.code_of("simulation") != fingerprint.code_of(
+        "simulation", without=["datasets"]
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -43,13 +43,15 @@ def _imports(module: str) -> Iterator[str]:
     yield from (n for n in names if n.split(".")[0] == _NAME and _file(n) is not None)
 
 
-def standing_on(*modules: str) -> tuple[str, ...]:
+def standing_on(*modules: str, without: Sequence[str] = ()) -> tuple[str, ...]:
     """Return modules of the package with all of the package that they import, in order of name.
 
     Parameters
     ----------
     modules
         Dotted names inside the package, such as ``"stages.passage"``.
+    without
+        Modules to leave out, with what only they import.
 
     Raises
     ------
@@ -57,10 +59,11 @@ def standing_on(*modules: str) -> tuple[str, ...]:
         If there is no such module.
     """
     open_names = [f"{_NAME}.{module}" for module in modules]
+    left_out = {f"{_NAME}.{module}" for module in without}
     found: set[str] = set()
     while open_names:
         name = open_names.pop()
-        if name not in found:
+        if name not in found and name not in left_out:
             found.add(name)
             open_names.extend(_imports(name))
     return tuple(sorted(found))
@@ -80,13 +83,15 @@ def _without_docstrings(tree: ast.Module) -> ast.Module:
     return tree
 
 
-def code_of(*modules: str) -> str:
+def code_of(*modules: str, without: Sequence[str] = ()) -> str:
     """Hash of the syntax trees of modules and of all of the package that they import.
 
     Parameters
     ----------
     modules
         Dotted names inside the package, such as ``"stages.passage"``.
+    without
+        Modules to leave out, with what only they import.
 
     Returns
     -------
@@ -99,7 +104,7 @@ def code_of(*modules: str) -> str:
         If there is no such module.
     """
     digest = hashlib.sha256()
-    for name in standing_on(*modules):
+    for name in standing_on(*modules, without=without):
         path = _file(name)
         assert path is not None  # standing_on has found it
         _, tree = _read(path.read_text(encoding="utf-8"))
