@@ -66,8 +66,8 @@ def pick_freeze_shares(
 
     References
     ----------
-    Janon et al., ESAIM Probab. Stat. 18 (2014) 342-364, eq. 6; Efron, Tibshirani, An Introduction
-    to the Bootstrap (1993), ch. 13.
+    Janon et al., ESAIM Probab. Stat. 18 (2014) 342-364; Efron, Tibshirani, An Introduction to the
+    Bootstrap (1993), ch. 13; docs/theory/reliability.md, eq. (13).
     """
     runs = np.array([np.asarray(one, dtype=float) for one in (values, same_first, same_second)])
     if runs.ndim != 2 or runs.shape[1] < 2:
