@@ -50,6 +50,7 @@ include: "workflow/rules/runs.smk"
 include: "workflow/rules/cases.smk"
 include: "workflow/rules/statistics.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/study_figures.smk"
 
 
 rule all:
@@ -63,6 +64,7 @@ rule all:
         rules.modes.output,
         runs_of_all_cases(),
         statistics_of_all_cases(),
+        figures_of_study(),
 
 
 rule truth:

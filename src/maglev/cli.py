@@ -571,6 +571,56 @@ def statistics_check(
 
 
 @main.command()
+@_config
+@_case
+@click.option("--baseline", type=_File, required=True, help="Baseline of the case.")
+@_designs
+@click.option(
+    "--surrogate",
+    "surrogates",
+    type=_of_method,
+    multiple=True,
+    help="Method and file of its surrogate.",
+)
+@_out
+def prediction(
+    configs: tuple[Path, ...],
+    case: str,
+    baseline: Path,
+    designs: tuple[tuple[str, Path], ...],
+    surrogates: tuple[tuple[str, Path], ...],
+    out: Path,
+) -> None:
+    """Predict the runs of the baseline of a case by each method."""
+    from maglev import datasets
+    from maglev.config import load_config
+    from maglev.stages import prediction, save
+
+    parameters = load_config(*configs)
+    result = prediction.dataset(
+        parameters,
+        datasets.read(baseline, "runs"),
+        {method: datasets.read(path, "design") for method, path in designs},
+        {method: datasets.read(path, "surrogate") for method, path in surrogates},
+    )
+    inputs = {"baseline": baseline, **{f"design_{method}": path for method, path in designs}}
+    inputs |= {f"surrogate_{method}": path for method, path in surrogates}
+    save(result.assign_attrs(case=case), out, "prediction", parameters, inputs)
+
+
+@main.command()
+@_config
+@_out
+def stability(configs: tuple[Path, ...], out: Path) -> None:
+    """Map where gains of the suspension hold the train."""
+    from maglev.config import load_config
+    from maglev.stages import save, stability
+
+    parameters = load_config(*configs)
+    save(stability.dataset(parameters), out, "stability", parameters)
+
+
+@main.command()
 @click.argument("name", type=click.Choice(list(FIGURES)))
 @click.argument("data", type=_File, nargs=-1, required=True)
 @click.option("--out", type=_File, required=True, help="File name without its ending.")

@@ -470,6 +470,12 @@ def _study_table() -> dict[str, Variable]:
                 "response cell", "1", "probability that the extreme is exceeded or levitation lost"
             ),
         ),
+        "density_direct_low": _number(
+            "response cell", PER_RESPONSE, "lower end of the confidence band of the direct density"
+        ),
+        "density_direct_high": _number(
+            "response cell", PER_RESPONSE, "upper end of the confidence band of the direct density"
+        ),
         "bandwidth": _number("response", OF_RESPONSE, "bandwidth of the direct density"),
         "mesh_size": _number("response", OF_RESPONSE, "mesh size of the GDEE"),
         "density_method": _code("response", "how the density was found", DENSITY_METHODS),
@@ -523,6 +529,13 @@ def _study_table() -> dict[str, Variable]:
             OF_RESPONSE,
             "root mean square error of the surrogate of so many runs against the baseline",
         ),
+        "step_error": _number(
+            "method step response",
+            "1",
+            "largest absolute error of the surrogate of so many runs at the runs of the design "
+            "that come next, as many as one round of the method asm has, over the standard "
+            "deviation",
+        ),
         "reference_limit": _number(level, OF_RESPONSE, "limit from the baseline"),
         "reference_half_width": _number(
             level, "1", "half the interval of the baseline's limit, over the standard deviation"
@@ -536,6 +549,39 @@ def _study_table() -> dict[str, Variable]:
             "half the interval of the baseline's limit given that levitation holds, over the "
             "standard deviation",
         ),
+        # predictions against the baseline
+        "computed": _number("sample response", OF_RESPONSE, "extreme of the run"),
+        "predicted_by": _number(
+            "method sample response", OF_RESPONSE, "extreme as predicted by the method's surrogate"
+        ),
+        "lost_by": _code(
+            "method sample", "whether the method predicts that levitation is lost", ("no", "yes")
+        ),
+        "prediction_rmse": _number(
+            "method response",
+            "1",
+            "root mean square error of the predictions at the runs that held, over the standard "
+            "deviation",
+        ),
+        "method_n_runs": _number("method", "1", "number of runs of the method's design", "int32"),
+        # stability of the suspension
+        "grid_proportional": _number(
+            "grid_proportional", "A m-1", "suspension proportional gain of the map"
+        ),
+        "grid_derivative": _number(
+            "grid_derivative", "A s m-1", "suspension derivative gain of the map"
+        ),
+        "growth_rate": _number(
+            "grid_derivative grid_proportional",
+            "s-1",
+            "fastest growth of a motion of one car with its magnets closed linearly over a rigid "
+            "track; negative where every motion dies out",
+        ),
+        "static_limit": _number(
+            "", "A m-1", "suspension proportional gain below which a magnet cannot hold: i0/delta0"
+        ),
+        "mean_proportional": _number("", "A m-1", "mean suspension proportional gain"),
+        "mean_derivative": _number("", "A s m-1", "mean suspension derivative gain"),
         # random track
         "density_both": _number(
             "response cell",
@@ -563,6 +609,72 @@ def _study_table() -> dict[str, Variable]:
         **_with_ends(
             "interaction_share",
             _number("response", "1", "share of the variance that gains and track have together"),
+        ),
+        # what figures show of several files
+        "curve": _number(
+            "curve", "1", "file that is shown by case and method, see flag_meanings", "int32"
+        ),
+        "curve_value": _number("curve response cell", OF_RESPONSE, "extreme"),
+        **_with_ends(
+            "curve_density",
+            _number(
+                "curve response cell",
+                PER_RESPONSE,
+                "probability density of the extreme of held samples",
+            ),
+        ),
+        **_with_ends(
+            "curve_exceedance",
+            _number(
+                "curve response cell",
+                "1",
+                "probability that the extreme is exceeded or levitation lost",
+            ),
+        ),
+        "curve_peak": _number("curve response", PER_RESPONSE, "largest value of the density"),
+        "curve_peak_error": _number(
+            "curve response", "1", "largest value of the density over that of the baseline, less 1"
+        ),
+        "curve_width": _number(
+            "curve response",
+            OF_RESPONSE,
+            "bandwidth of the direct density or mesh size of the GDEE",
+        ),
+        **_with_ends(
+            "curve_limit",
+            _number(
+                "curve response failure_probability",
+                OF_RESPONSE,
+                "limit that is exceeded with the failure probability",
+            ),
+        ),
+        **_with_ends(
+            "curve_held_limit",
+            _number(
+                "curve response failure_probability",
+                OF_RESPONSE,
+                "limit that is exceeded with the failure probability given that levitation holds",
+            ),
+        ),
+        **_with_ends(
+            "curve_lost_probability",
+            _number("curve", "1", "probability that levitation is lost"),
+        ),
+        "curve_n_runs": _number("curve", "1", "number of runs of the model", "int32"),
+        "curve_n_lost": _number("curve", "1", "number of them that lost levitation", "int32"),
+        "curve_variation": _number("curve", "1", "coefficient of variation of the gains"),
+        "curve_round_n_runs": _number(
+            "curve round", "1", "number of runs after the round, 0 where there is none", "int32"
+        ),
+        "curve_error": _number(
+            "curve round response",
+            "1",
+            "largest absolute error of the predictions of the round, over the standard deviation",
+        ),
+        "curve_rmse": _number(
+            "curve round response",
+            OF_RESPONSE,
+            "root mean square error of the surrogate after the round against the baseline",
         ),
         # tables and checks
         **_with_ends(
@@ -799,6 +911,7 @@ LAYOUTS: Mapping[str, Layout] = {
             "lost_probability",
             "n_runs",
         ),
+        optional=("density_direct_low", "density_direct_high"),
     ),
     "limits": Layout(
         title="Limits of the extremes at given failure probabilities",
@@ -819,12 +932,29 @@ LAYOUTS: Mapping[str, Layout] = {
             "step_held_limit_error",
             "step_lost_probability",
             "step_rmse",
+            "step_error",
             "reference_limit",
             "reference_half_width",
             "reference_held_limit",
             "reference_held_half_width",
             "sigma",
         ),
+    ),
+    "prediction": Layout(
+        title="Extremes as predicted by the methods against those of the baseline",
+        variables=(
+            "computed",
+            "status",
+            "predicted_by",
+            "lost_by",
+            "prediction_rmse",
+            "method_n_runs",
+            "sigma",
+        ),
+    ),
+    "stability": Layout(
+        title="Stability of the levitated train by the gains of the suspension",
+        variables=("growth_rate", "static_limit", "mean_proportional", "mean_derivative"),
     ),
     "track_split": Layout(
         title="What random gains and a random track contribute to the extremes",

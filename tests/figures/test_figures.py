@@ -8,6 +8,8 @@ from maglev import datasets
 from maglev.datasets import LAYOUTS, VARIABLES
 from maglev.figures import FIGURES, draw
 
+VALIDATION = ("irregularity", "deflection", "histories", "gaps", "modes")
+
 SIZES = {
     "sample": 1, "car": 2, "magnet": 4, "t": 400, "x": 60, "side": 2, "mode": 6,
     "wavenumber": 20, "speed": 4, "measured_speed": 1,
@@ -31,6 +33,7 @@ def tiny(layout):
         data["magnet_side"] = (("magnet",), np.array([1, -1, 1, -1]))
         data["status"] = (("sample",), np.array([0]))
         data["lost_magnet"] = (("sample",), np.array([-1]))
+        data["track_seed"] = (("sample",), np.array([1]))
     if layout == "modes":
         data["direction"] = (("mode",), np.array([0, 1, 2, 3, 2, 1]))
         data["frequency"] = (("mode",), np.array([2.0, 3.0, 8.5, 20.0, 28.0, 30.0]))
@@ -51,7 +54,7 @@ def files(tmp_path, name, demonstration=False):
     return paths
 
 
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", VALIDATION)
 def test_a_figure_is_drawn_with_its_numbers_and_the_same_again(tmp_path, name):
     paths = files(tmp_path, name)
     for out in ("one", "two"):

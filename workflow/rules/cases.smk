@@ -3,6 +3,11 @@
 
 DESIGNED = [method for method in METHODS if method != "mcm"]
 TABLE_CASE = "validation"
+GAIN_CASES = [
+    case for case in parameters.cases if case.startswith("only_") or case == "all_gains"
+]
+VARIATION_CASES = [case for case in parameters.cases if case.startswith("cov_")]
+SPLIT_CASES = [case for case in parameters.cases if parameters.cases[case].random_track]
 
 
 def methods_of(case: str, designed: bool = False) -> list[str]:
@@ -68,3 +73,32 @@ def statistics_of_all_cases() -> list[str]:
         *(f"<results>/tables/{table}.nc" for table in tables),
         *(["<results>/checks/statistics.nc"] if checked_cases(every=False) else []),
     ]
+
+
+def shown(name: str, cases: list[str]) -> list[str]:
+    """A file of each case by the method it is shown by: the last that has a surrogate."""
+    return [
+        f"<results>/{case}/{methods_of(case, designed=True)[-1]}/{name}.nc"
+        for case in cases
+        if methods_of(case, designed=True)
+    ]
+
+
+def figures_of_study() -> list[str]:
+    """Figures that the cases and methods named in the configuration allow."""
+    figures = []
+    if TABLE_CASE in parameters.cases and "mcm" in methods_of(TABLE_CASE):
+        figures += ["fig11", "fig12", "fig_stability", "fig_scatter"]
+        if methods_of(TABLE_CASE, designed=True):
+            figures += ["fig9", "fig10", "fig_accuracy"]
+    if TABLE_CASE in parameters.cases and methods_of(TABLE_CASE, designed=True):
+        figures.append("fig_sobol")
+    for cases, names in (
+        (GAIN_CASES, ["fig13", "fig14"]),
+        (VARIATION_CASES, ["fig15", "fig16"]),
+    ):
+        if cases and all(methods_of(case, designed=True) for case in cases):
+            figures += names
+    if SPLIT_CASES:
+        figures.append("fig_track_split")
+    return [f"<results>/figures/{figure}.png" for figure in sorted(figures)]

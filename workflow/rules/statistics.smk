@@ -171,6 +171,57 @@ rule accuracy:
         "--out {output} 2> {log}"
 
 
+rule prediction:
+    input:
+        config="<results>/config/prediction.yaml",
+        baseline="<results>/{case}/mcm.nc",
+        designs=lambda wildcards: files_of_case("design", wildcards.case, designed=True),
+        surrogates=lambda wildcards: files_of_case(
+            "surrogate", wildcards.case, designed=True
+        ),
+    output:
+        "<results>/{case}/prediction.nc",
+    log:
+        "<logs>/{case}/prediction.log",
+    benchmark:
+        "<benchmarks>/{case}/prediction.tsv"
+    conda:
+        "../envs/maglev.yaml"
+    params:
+        code=code_of("stages.prediction"),
+        designs=lambda wildcards, input: named(
+            "design", methods_of(wildcards.case, designed=True), input.designs
+        ),
+        surrogates=lambda wildcards, input: named(
+            "surrogate", methods_of(wildcards.case, designed=True), input.surrogates
+        ),
+    message:
+        "Predict the baseline of '{wildcards.case}' by every method"
+    shell:
+        "NUMBA_NUM_THREADS={threads} maglev prediction --config {input.config} "
+        "--case {wildcards.case} --baseline {input.baseline} {params.designs} "
+        "{params.surrogates} --out {output} 2> {log}"
+
+
+rule stability:
+    input:
+        config="<results>/config/stability.yaml",
+    output:
+        "<results>/stability.nc",
+    log:
+        "<logs>/stability.log",
+    benchmark:
+        "<benchmarks>/stability.tsv"
+    conda:
+        "../envs/maglev.yaml"
+    params:
+        code=code_of("stages.stability"),
+    message:
+        "Map which gains of the suspension hold the train"
+    shell:
+        "maglev stability --config {input.config} --out {output} 2> {log}"
+
+
 rule track_split:
     input:
         config="<results>/config/track_split.yaml",

@@ -11,8 +11,50 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "histories": ("passage",),
     "gaps": ("passage",),
     "modes": ("modes",),
+    "training": ("accuracy", "design*"),
+    "prediction": ("prediction",),
+    "density_by_method": ("density*",),
+    "exceedance_by_method": ("density*",),
+    "density_by_gain": ("density*", "design*"),
+    "limits_by_gain": ("limits*", "design*"),
+    "density_by_variation": ("density*", "design*"),
+    "limits_by_variation": ("limits*", "design*"),
+    "sobol": ("surrogate",),
+    "stability": ("stability", "runs"),
+    "accuracy": ("accuracy",),
+    "scatter": ("runs",),
+    "track_split": ("track_split",),
 }
-"""Every figure with the layouts of the files that it is drawn from, in order."""
+"""Every figure with the layouts of the files that it is drawn from, in order.
+
+A star stands for any number of files of that layout; two stars in one figure, for equally many,
+first all of the one, then all of the other."""
+
+
+def layouts_of(name: str, n_files: int) -> list[tuple[str, ...]]:
+    """Layouts of so many files of a figure, those behind a star together.
+
+    Parameters
+    ----------
+    name
+        A key of `FIGURES`.
+    n_files
+        Number of files.
+
+    Raises
+    ------
+    ValueError
+        If the figure needs more or fewer files.
+    """
+    entries = FIGURES[name]
+    starred = sum(one.endswith("*") for one in entries)
+    left = n_files - (len(entries) - starred)
+    if (starred == 0 and left != 0) or (starred and (left < starred or left % starred)):
+        many = "any number of each *" if starred else f"{len(entries)} files"
+        raise ValueError(
+            f"figure {name} is drawn from {many} ({', '.join(entries)}), got {n_files}"
+        )
+    return [(one[:-1],) * (left // starred) if one.endswith("*") else (one,) for one in entries]
 
 
 def draw(name: str, data: Sequence[str | Path], out: str | Path) -> None:
@@ -41,16 +83,23 @@ def draw(name: str, data: Sequence[str | Path], out: str | Path) -> None:
     from maglev.figures import style
     from maglev.fingerprint import code_of
 
-    layouts = FIGURES[name]
-    if len(data) != len(layouts):
-        raise ValueError(
-            f"figure {name} is drawn from {len(layouts)} files ({', '.join(layouts)}), "
-            f"got {len(data)}"
-        )
-    read = [datasets.read(path, layout) for path, layout in zip(data, layouts, strict=True)]
+    paths = iter(data)
+    roles: dict[str, str | Path] = {}
+    arguments: list[object] = []
+    read = []
+    for entry, layouts in zip(FIGURES[name], layouts_of(name, len(data)), strict=True):
+        group = []
+        for layout in layouts:
+            path = next(paths)
+            one = datasets.read(path, layout)
+            owner = "_".join(one.attrs[key] for key in ("case", "method") if key in one.attrs)
+            roles[f"{layout}_{owner}" if entry.endswith("*") else layout] = path
+            group.append(one)
+        arguments.append(group if entry.endswith("*") else group[0])
+        read += group
     demonstration = any(one.attrs.get("demonstration") == "yes" for one in read)
     with style.page():
-        figure, plotted = import_module(f"maglev.figures.{name}").figure(*read)
+        figure, plotted = import_module(f"maglev.figures.{name}").figure(*arguments)
         if demonstration:
             style.mark_demonstration(figure)
         style.save(figure, Path(out))
@@ -61,9 +110,6 @@ def draw(name: str, data: Sequence[str | Path], out: str | Path) -> None:
         "references": datasets.REFERENCES,
         "code": code_of(f"figures.{name}"),
         "demonstration": "yes" if demonstration else "no",
-        **{
-            f"input_{layout}": f"sha256:{datasets.file_hash(path)}"
-            for path, layout in zip(data, layouts, strict=True)
-        },
+        **{f"input_{role}": f"sha256:{datasets.file_hash(path)}" for role, path in roles.items()},
     }
-    datasets.write_netcdf(plotted, Path(out).with_name(f"{Path(out).name}.nc"))
+    datasets.write_netcdf(datasets.describe(plotted), Path(out).with_name(f"{Path(out).name}.nc"))

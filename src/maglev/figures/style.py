@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -36,6 +38,8 @@ def page() -> Iterator[None]:
             "axes.spines.top": False,
             "axes.spines.right": False,
             "axes.grid": True,
+            "axes.axisbelow": True,
+            "axes.formatter.useoffset": False,
             "grid.color": "#e5e5e5",
             "grid.linewidth": 0.5,
             "pdf.fonttype": 42,
@@ -73,6 +77,43 @@ def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
         zorder=5,
     )
+
+
+def table(
+    axis: Axes,
+    rows: Sequence[Sequence[str]],
+    places: Sequence[float],
+    colours: Sequence[str],
+    height: float,
+) -> None:
+    """Write a table in place of a panel: a heading, then a coloured row per line of the figure.
+
+    Parameters
+    ----------
+    axis
+        Panel, which loses its axes.
+    rows
+        The heading and the rows, a text per column.
+    places
+        Left end of each column [share of the width].
+    colours
+        Colour of each row behind the heading.
+    height
+        Of a row [share of the height].
+    """
+    axis.axis("off")
+    for number, row in enumerate(rows):
+        y = 0.97 - height * number
+        colour = "#000000" if number == 0 else colours[number - 1]
+        for x, text in zip(places, row, strict=True):
+            axis.text(x, y, text, color=colour, fontsize=7, va="top", transform=axis.transAxes)
+    y = 0.97 - height + 0.035
+    axis.plot([0.0, 1.0], [y, y], color="#000000", lw=0.5, transform=axis.transAxes)
+
+
+def below(figure: Figure, handles: Sequence[Artist], words: Sequence[str], **options: Any) -> None:
+    """Put a legend under all panels, off the data."""
+    figure.legend(handles, words, loc="outside lower center", **options)
 
 
 def mark_demonstration(figure: Figure) -> None:

@@ -67,6 +67,8 @@ SECTIONS: Mapping[str, tuple[str, ...]] = {
     "limits": (*_STATISTICS, "study.failure_probability"),
     "accuracy": (*_STATISTICS, *_SURROGATES, "study.failure_probability"),
     "track_split": ("demonstration", "seed", "study.confidence"),
+    "prediction": (*_STATISTICS, *_SURROGATES),
+    "stability": ("demonstration", "train", "gains"),
     "table1": ("demonstration",),
     "paper_and_ours": ("demonstration",),
     "statistics_check": ("demonstration", "study.confidence", "study.failure_probability"),

@@ -101,7 +101,8 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
     n_steps = max(len(one) for one in sizes.values())
     shape = (len(designs), n_steps, len(RESPONSES))
     n_runs = np.zeros(shape[:2], dtype=int)
-    rmse, share = np.full(shape, np.nan), np.full(shape[:2], np.nan)
+    rmse, error = np.full(shape, np.nan), np.full(shape, np.nan)
+    share = np.full(shape[:2], np.nan)
     limit, held_limit = (np.full((*shape, len(levels)), np.nan) for _ in range(2))
     names = sorted(designs, key=METHODS.index)
     for row, name in enumerate(names):
@@ -115,6 +116,11 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
             predicted, held = found.surrogate.predict(points), found.held(points)
             rmse[row, step] = np.sqrt(np.mean((predicted - truth)[~away] ** 2, axis=0))
             share[row, step] = 1.0 - held.mean()
+            following = designs[name].isel(sample=slice(n, n + config.study.asm.batch_size))
+            following = following.isel(sample=~lost(following))
+            if following.sizes["sample"]:
+                ahead = found.surrogate.predict(following["standard"].to_numpy())
+                error[row, step] = np.abs(ahead - extremes(following)).max(axis=0) / sigma
             if not held.any():
                 continue
             for of, without in ((limit, int(np.count_nonzero(~held))), (held_limit, 0)):
@@ -139,6 +145,7 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
             ),
             "step_lost_probability": (of_step[:2], share),
             "step_rmse": (of_step, rmse),
+            "step_error": (of_step, error),
             "reference_limit": (level, reference_limit),
             "reference_half_width": (level, half_width),
             "reference_held_limit": (level, reference_held),

@@ -56,7 +56,12 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
         column = _column(held.values, held.probability, held.lost_probability)
         n_beyond = np.round(column["exceedance"] * n)
         low, high = binomial_interval(n_beyond, n, config.study.confidence)
-        columns.append(column | {"exceedance_low": low, "exceedance_high": high})
+        band = density_band(column, held.values, held.lost_probability, n, config.study.confidence)
+        columns.append(
+            column
+            | {"exceedance_low": low, "exceedance_high": high}
+            | {"density_direct_low": band[0], "density_direct_high": band[1]}
+        )
     result = _dataset(columns, float(away.mean()), n)
     result["exceedance"].attrs["comment"] = "interval: exact binomial, at each value by itself"
     return result
@@ -177,6 +182,46 @@ def binomial_interval(
     low = np.where(k > 0, stats.beta.ppf(outside, np.maximum(k, 1), n - k + 1), 0.0)
     high = np.where(k < n, stats.beta.ppf(1.0 - outside, k + 1, np.maximum(n - k, 1)), 1.0)
     return low, high
+
+
+def density_band(
+    column: dict, values: FloatArray, lost_probability: float, n: int, confidence: float
+) -> tuple[FloatArray, FloatArray]:
+    """Band of the sampling noise of a direct density of independent runs, place by place.
+
+    The density is a mean over all runs of the kernel φ_h, its variance that of the kernel over n;
+    the mean of φ_h² is the direct density with the bandwidth h/√2, over 2√π h.  The kernel's bias
+    is not in it.
+
+    Parameters
+    ----------
+    column
+        ``value``, ``density_direct`` and ``bandwidth`` h of the density.
+    values : (sample,)
+        Extremes that held [their unit].
+    lost_probability
+        Share of runs that did not [-].
+    n
+        Number of all runs.
+    confidence
+        Two-sided confidence [-].
+
+    Returns
+    -------
+    low, high : (place,)
+        Ends of the band [1/unit]; the lower one is at least 0.
+
+    References
+    ----------
+    Silverman, Density Estimation (1986), sec. 3.3.
+    """
+    h, density = column["bandwidth"], column["density_direct"]
+    narrower = direct_density(
+        column["value"], values, bandwidth=h / np.sqrt(2.0), lost_probability=lost_probability
+    )
+    variance = np.maximum(narrower / (2.0 * np.sqrt(np.pi) * h) - density**2, 0.0) / n
+    half = stats.norm.ppf(0.5 + 0.5 * confidence) * np.sqrt(variance)
+    return np.maximum(density - half, 0.0), density + half
 
 
 def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> FloatArray:

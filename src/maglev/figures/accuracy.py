@@ -1,0 +1,74 @@
+"""Accuracy bought per run: errors of the limits of every method against its number of runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from maglev.datasets import METHODS
+from maglev.figures import labels, style
+
+AIM = 0.1
+"""Error that counts as good, in standard deviations."""
+
+_FLOOR = 1e-3  # smaller errors are drawn there
+
+
+def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
+    """Draw the error of the rarest limit that the baseline carries, given that levitation holds.
+
+    Parameters
+    ----------
+    data
+        Layout ``accuracy``.
+
+    Returns
+    -------
+    figure, plotted
+        The figure and the numbers in it.
+
+    Raises
+    ------
+    ValueError
+        If the baseline carries no limit of a response.
+    """
+    levels = data["failure_probability"].to_numpy()
+    fig, axes = style.panels(2, 3, style.PAGE, 4.5)
+    for response, axis in enumerate(axes):
+        at = data.isel(response=response)
+        carried = np.flatnonzero(np.isfinite(at["reference_held_limit"].to_numpy()))
+        if carried.size == 0:
+            raise ValueError("figure accuracy: the baseline carries no limit; give it more runs")
+        level = carried[np.argmin(levels[carried])]
+        at = at.isel(failure_probability=level)
+        noise = float(at["reference_held_half_width"])
+        axis.axhspan(_FLOOR, noise, color="#000000", alpha=0.1, lw=0, label="MCM's own noise")
+        axis.axhline(AIM, color=style.QUIET, ls=":", lw=0.9, label=f"aim: {AIM} σ")
+        for row, code in enumerate(data["method"].to_numpy()):
+            method = METHODS[code]
+            n_runs = at["step_n_runs"].to_numpy()[row]
+            error = np.abs(at["step_held_limit_error"].to_numpy()[row])
+            kept = (n_runs > 0) & np.isfinite(error)
+            axis.plot(
+                n_runs[kept],
+                error[kept].clip(min=_FLOOR),
+                **labels.METHOD_STYLE[method],
+                marker=labels.METHOD_MARKER[method],
+                ms=3,
+                lw=0.9,
+                label=labels.METHOD[method],
+            )
+        axis.set(yscale="log", xlim=(0, None))
+        axis.set_ylim(_FLOOR, max(5.0, axis.get_ylim()[1]))
+        if response % 3 == 0:
+            axis.set_ylabel("error of the limit [σ]")
+        if response >= 3:
+            axis.set_xlabel("number of runs")
+        style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
+        style.note(axis, f"at {levels[level]:g}: MCM ± {noise:.2g} σ")
+    title = (
+        "rarest limit that MCM carries, given that levitation holds; its noise: half its interval"
+    )
+    style.below(fig, *axes[0].get_legend_handles_labels(), ncols=5, title=title, title_fontsize=7)
+    return fig, data

@@ -1,0 +1,205 @@
+"""Densities, exceedances and limits of several files as curves: gathered, and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from matplotlib.axes import Axes
+
+from maglev.datasets import LIMIT_STATUS, RESPONSES, VARIABLES
+from maglev.figures import labels
+
+FloatArray = npt.NDArray[np.float64]
+
+_ENDS = ("", "_low", "_high")
+_INFINITE = LIMIT_STATUS.index("infinite")
+_GIVEN = LIMIT_STATUS.index("given")
+
+
+def named(data: Sequence[xr.Dataset]) -> xr.DataArray:
+    """The coordinate ``curve`` of files: their cases and methods."""
+    names = [f"{labels.case_of(one)}-{labels.method_of(one)}" for one in data]
+    flags = {"flag_values": np.arange(len(names), dtype="int32"), "flag_meanings": " ".join(names)}
+    return xr.DataArray(np.arange(len(names), dtype="int32"), dims="curve", attrs=flags)
+
+
+def densities(data: Sequence[xr.Dataset]) -> xr.Dataset:
+    """Put files of the layout ``density`` side by side along ``curve``.
+
+    A density is that of the GDEE, where there is none the direct one with its band.
+    """
+    columns: dict[str, list[FloatArray]] = {}
+
+    def add(name: str, values: xr.DataArray | FloatArray) -> None:
+        columns.setdefault(name, []).append(np.asarray(values, dtype=float))
+
+    for one in data:
+        evolved = np.isfinite(one["peak"].to_numpy())
+        nothing = xr.full_like(one["density_direct"], np.nan)
+        add("value", one["value"])
+        add("density", np.where(evolved[:, None], one["density"], one["density_direct"]))
+        for end in _ENDS[1:]:
+            band = one.get(f"density_direct{end}", nothing)
+            add(f"density{end}", np.where(evolved[:, None], np.nan, band))
+        for end in _ENDS:
+            add(f"exceedance{end}", one[f"exceedance{end}"])
+        add("peak", np.where(evolved, one["peak"], one["peak_direct"]))
+        add("width", np.where(evolved, one["mesh_size"], one["bandwidth"]))
+        add("lost_probability", one["lost_probability"])
+        add("n_runs", one["n_runs"])
+    return _gathered(data, columns, ("cell",))
+
+
+def limits(data: Sequence[xr.Dataset]) -> xr.Dataset:
+    """Put files of the layout ``limits`` side by side along ``curve``.
+
+    Raises
+    ------
+    ValueError
+        If their failure probabilities differ.
+    """
+    levels = data[0]["failure_probability"].to_numpy()
+    columns: dict[str, list[FloatArray]] = {}
+    for one in data:
+        if not np.array_equal(one["failure_probability"].to_numpy(), levels):
+            raise ValueError("all limits must be at the same failure probabilities")
+        for name in ("limit", "held_limit"):
+            given = one[f"{name}_status"].to_numpy() == _GIVEN
+            infinite = one[f"{name}_status"].to_numpy() == _INFINITE
+            for end in _ENDS:
+                values = np.where(given, one[f"{name}{end}"], np.nan)
+                values = np.where(infinite, np.inf, values)
+                columns.setdefault(f"{name}{end}", []).append(values)
+        for end in _ENDS:
+            value = one[f"lost_probability{end}"].to_numpy()
+            columns.setdefault(f"lost_probability{end}", []).append(value)
+        columns.setdefault("n_runs", []).append(one["n_runs"].to_numpy())
+    found = _gathered(data, columns, ("failure_probability",))
+    return found.assign_coords(failure_probability=levels)
+
+
+def _gathered(
+    data: Sequence[xr.Dataset], columns: dict[str, list[FloatArray]], last: tuple[str, ...]
+) -> xr.Dataset:
+    dims = ("curve", "response", *last)
+    variables = {}
+    for name, values in columns.items():
+        stacked = np.stack(values).astype(VARIABLES[f"curve_{name}"].dtype)
+        variables[f"curve_{name}"] = (dims[: stacked.ndim], stacked)
+    response = np.arange(len(RESPONSES), dtype=np.int8)
+    return xr.Dataset(variables, coords={"curve": named(data), "response": response})
+
+
+def body(curves: xr.Dataset, response: int, tail: float) -> tuple[float, float]:
+    """Range of values that holds all but ``tail`` of the held part of every curve on each side."""
+    low, high = [], []
+    for number in range(curves.sizes["curve"]):
+        one = curves.isel(curve=number, response=response)
+        held = one["curve_exceedance"].to_numpy() - float(one["curve_lost_probability"])
+        value = one["curve_value"].to_numpy()
+        inside = value[(held < (1 - tail) * held.max()) & (held > tail * held.max())]
+        low.append(inside.min() if inside.size else value.min())
+        high.append(inside.max() if inside.size else value.max())
+    margin = 0.12 * (max(high) - min(low))
+    return min(low) - margin, max(high) + margin
+
+
+def draw_densities(
+    axis: Axes, curves: xr.Dataset, response: int, styles: Sequence[dict[str, object]]
+) -> None:
+    """Draw the densities of a response, each with its band if it has one.
+
+    Curves that tower over the widest ones run out of the panel; their peaks are then written, in
+    their colours, into its upper right corner.
+    """
+    shown = labels.SHOWN[response]
+    at = curves.isel(response=response)
+    peaks = at["curve_density"].max("cell").to_numpy() / shown.scale
+    top = 1.12 * peaks[peaks <= 5.0 * peaks.min()].max()
+    for number, look in enumerate(styles):
+        one = at.isel(curve=number)
+        value = shown.scale * one["curve_value"]
+        low, high = (one[f"curve_density{end}"].to_numpy() / shown.scale for end in _ENDS[1:])
+        if np.isfinite(low).any():
+            axis.fill_between(value, low, high, color=str(look["color"]), alpha=0.18, lw=0)
+        axis.plot(value, one["curve_density"] / shown.scale, **look)
+    beyond = [k for k in range(len(styles)) if peaks[k] > top]
+    for row, k in enumerate(sorted(beyond, key=lambda k: -peaks[k])):
+        axis.text(
+            0.98,
+            0.97 - 0.1 * row,
+            f"peak {peaks[k]:.3g}",
+            color=str(styles[k]["color"]),
+            transform=axis.transAxes,
+            ha="right",
+            va="top",
+            fontsize=6.5,
+        )
+    axis.set_ylim(0, top)
+    axis.locator_params(axis="x", nbins=5)
+    axis.set_xlabel(shown.axis)
+    axis.set_ylabel(shown.density_axis)
+
+
+def finite_ends(
+    curves: xr.Dataset, response: int
+) -> tuple[dict[str, FloatArray], npt.NDArray[np.bool_]]:
+    """Limits with their ends (curve, level), and which of them hold only given levitation.
+
+    Where losses alone are likelier than the failure probability there is no limit; the limit given
+    that levitation holds stands in its place.
+    """
+    at = curves.isel(response=response)
+    scale = labels.SHOWN[response].scale
+    instead = ~np.isfinite(at["curve_limit_high"].to_numpy()) & ~np.isnan(
+        at["curve_limit"].to_numpy()
+    )
+    ends = {
+        end: scale * np.where(instead, at[f"curve_held_limit{end}"], at[f"curve_limit{end}"])
+        for end in _ENDS
+    }
+    return ends, instead
+
+
+def draw_limits(
+    axis: Axes,
+    x: FloatArray,
+    ends: dict[str, FloatArray],
+    instead: npt.NDArray[np.bool_],
+    look: dict[str, object],
+) -> None:
+    """Draw limits against something with their intervals; hollow where levitation is given.
+
+    Parameters
+    ----------
+    axis
+        Where to draw.
+    x, ends, instead : (point,)
+        As `finite_ends` returns them, for one line.
+    look
+        Line style with ``color`` and ``marker``.
+    """
+    middle, low, high = (ends[end] for end in _ENDS)
+    kept = np.isfinite(middle)
+    axis.plot(x[kept], middle[kept], **{**look, "marker": ""})
+    reach = np.abs(np.stack([middle - low, high - middle]))
+    for hollow in (False, True):
+        chosen = kept & (instead == hollow)
+        if chosen.any():
+            axis.errorbar(
+                x[chosen],
+                middle[chosen],
+                yerr=np.where(np.isfinite(reach), reach, 0.0)[:, chosen],
+                ls="",
+                marker=look["marker"],
+                ms=3.5,
+                color=look["color"],
+                mfc="white" if hollow else look["color"],
+                capsize=1.5,
+                elinewidth=0.7,
+                capthick=0.7,
+                lw=0.7,
+            )

@@ -1,0 +1,76 @@
+"""Probability that the extremes are exceeded, by every method, down to what the runs can carry."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from maglev.figures import curves, labels, style
+
+
+def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
+    """Draw the exceedance of the six responses, the baseline with its band.
+
+    Parameters
+    ----------
+    densities
+        Layout ``density``, of the methods of one case.
+
+    Returns
+    -------
+    figure, plotted
+        The figure and the numbers in it.
+
+    Raises
+    ------
+    ValueError
+        If there is no baseline among them.
+    """
+    methods = [labels.method_of(one) for one in densities]
+    if "mcm" not in methods:
+        raise ValueError("figure exceedance_by_method: there is no baseline among the densities")
+    found = curves.densities(densities)
+    truth = methods.index("mcm")
+    n = int(found["curve_n_runs"][truth])
+    fig, axes = style.panels(2, 3, style.PAGE, 4.6)
+    for response, axis in enumerate(axes):
+        shown, at = labels.SHOWN[response], found.isel(response=response)
+        for number, name in enumerate(methods):
+            one = at.isel(curve=number)
+            value = shown.scale * one["curve_value"]
+            if number == truth:
+                axis.fill_between(
+                    value,
+                    one["curve_exceedance_low"].clip(min=1e-9),
+                    one["curve_exceedance_high"],
+                    color="#000000",
+                    alpha=0.15,
+                    lw=0,
+                    label=f"MCM, {labels.confidence(densities[truth])} interval"
+                    if response == 0
+                    else None,
+                )
+            runs, lost = int(one["curve_n_runs"]), float(one["curve_lost_probability"])
+            axis.plot(
+                value,
+                one["curve_exceedance"].where(one["curve_exceedance"] > 0),
+                **labels.METHOD_STYLE[name],
+                label=f"{labels.PDEM[name]}, {runs} runs, lost {labels.percent(lost)}",
+            )
+        axis.set_yscale("log")
+        axis.set_ylim(0.7 / n, 1.3)
+        baseline = at.isel(curve=truth)
+        held = (baseline["curve_exceedance"] - baseline["curve_lost_probability"]).to_numpy()
+        value = baseline["curve_value"].to_numpy()
+        inside = value[(held < 0.999 * held.max()) & (held > 1.5 / n)]
+        margin = 0.05 * np.ptp(inside)
+        axis.set_xlim(shown.scale * (inside.min() - margin), shown.scale * (inside.max() + margin))
+        axis.set_xlabel(shown.axis)
+        if response % 3 == 0:
+            axis.set_ylabel("probability of exceedance [-]")
+        style.titled(axis, "abcdef"[response], shown.name)
+    style.below(fig, *axes[0].get_legend_handles_labels(), ncols=3)
+    return fig, found

@@ -1,0 +1,153 @@
+"""Names, units and colours of responses, gains, methods and cases, the same in every figure."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import xarray as xr
+
+from maglev.datasets import GAINS, METHODS, RESPONSES
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """How a response is shown.
+
+    Parameters
+    ----------
+    name
+        For a panel's title.
+    symbol
+        Short, for an axis.
+    scale
+        Shown number over the one in SI [-].
+    unit
+        Of the shown number.
+    """
+
+    name: str
+    symbol: str
+    scale: float
+    unit: str
+
+    @property
+    def axis(self) -> str:
+        """Label of an axis along which the response is shown."""
+        return f"{self.symbol} [{self.unit}]"
+
+    @property
+    def density_axis(self) -> str:
+        """Label of an axis along which its density is shown."""
+        return f"density [{'1/mm' if self.unit == 'mm' else 's²/m'}]"
+
+
+_MM, _ACCELERATION = (1e3, "mm"), (1.0, "m/s²")
+SHOWN = tuple(
+    Shown(name=name, symbol=symbol, scale=scale, unit=unit)
+    for name, symbol, (scale, unit) in (
+        ("midspan displacement, vert.", "displacement", _MM),
+        ("midspan displacement, lat.", "displacement", _MM),
+        ("midspan acceleration, vert.", "acceleration", _ACCELERATION),
+        ("midspan acceleration, lat.", "acceleration", _ACCELERATION),
+        ("car-body acceleration, vert.", "acceleration", _ACCELERATION),
+        ("car-body acceleration, lat.", "acceleration", _ACCELERATION),
+    )
+)
+"""How each response is shown, in the order of `maglev.datasets.RESPONSES`."""
+
+assert len(SHOWN) == len(RESPONSES)
+
+GAIN = ("suspension $k_p$", "suspension $k_d$", "guidance $k_p$", "guidance $k_d$")
+"""The gains in short, in the order of `maglev.datasets.GAINS`."""
+
+GAIN_COLOUR = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00")
+"""Their colours: suspension blue, guidance orange."""
+
+METHOD = {"mcm": "MCM", "osm": "OSM", "asm_paper": "ASM (paper)", "asm": "ASM (ours)"}
+"""The methods in short."""
+
+PDEM = {"mcm": "MCM", "osm": "OSM-PDEM", "asm_paper": "ASM-PDEM (paper)", "asm": "ASM-PDEM (ours)"}
+"""The same for what is found with the density evolution."""
+
+METHOD_STYLE = {
+    "mcm": {"color": "#000000", "ls": "-"},
+    "osm": {"color": "#D55E00", "ls": "--"},
+    "asm_paper": {"color": "#009E73", "ls": "-."},
+    "asm": {"color": "#0072B2", "ls": "-"},
+}
+"""Their lines; the dashes tell them apart without colour."""
+
+METHOD_MARKER = {"mcm": "s", "osm": "s", "asm_paper": "^", "asm": "o"}
+"""Their markers."""
+
+
+def method_of(data: xr.Dataset) -> str:
+    """Name of the method that a file belongs to.
+
+    Raises
+    ------
+    ValueError
+        If the file does not say it.
+    """
+    name = data.attrs.get("method", "")
+    if name not in METHODS:
+        raise ValueError(f"the file must say its method, one of {', '.join(METHODS)}, got '{name}'")
+    return str(name)
+
+
+def case_of(data: xr.Dataset) -> str:
+    """Name of the case that a file belongs to, in words."""
+    return str(data.attrs.get("case", ""))
+
+
+def settings(design: xr.Dataset) -> tuple[float, int]:
+    """Coefficient of variation and number of spans of the case of a design or a set of runs.
+
+    Raises
+    ------
+    ValueError
+        If the file does not say them.
+    """
+    try:
+        of_case = json.loads(design.attrs["config"])["cases"][design.attrs["case"]]
+        return float(of_case["coefficient_of_variation"]), int(of_case["n_spans"])
+    except (KeyError, TypeError):
+        raise ValueError("the file must say its case and how it was configured") from None
+
+
+def confidence(data: xr.Dataset) -> str:
+    """Confidence of the intervals of a file as a percentage.
+
+    Raises
+    ------
+    ValueError
+        If the file does not say it.
+    """
+    try:
+        return f"{100 * json.loads(data.attrs['config'])['study']['confidence']:g} %"
+    except (KeyError, TypeError):
+        raise ValueError("the file must say the confidence of its intervals") from None
+
+
+def gains_of(data: xr.Dataset) -> list[int]:
+    """Numbers of the random gains of a file."""
+    return [int(number) for number in data["parameter"].to_numpy()]
+
+
+def case_style(parameters: list[int]) -> tuple[str, dict[str, object]]:
+    """Words and line for a case by its random gains."""
+    if len(parameters) == 1:
+        number = parameters[0]
+        dashes = ("--", "-.", (0, (4, 1, 1, 1, 1, 1)), ":")[number]
+        return f"{GAIN[number]} alone", {"color": GAIN_COLOUR[number], "ls": dashes}
+    if len(parameters) == len(GAINS):
+        return "all four gains", {"color": "#000000", "ls": "-"}
+    return " and ".join(GAIN[number] for number in parameters), {"color": "#999999", "ls": "-"}
+
+
+def percent(share: float) -> str:
+    """A share as a percentage with two digits."""
+    if share == 0.0:
+        return "0 %"
+    return f"{100 * share:.2g} %" if share >= 1e-5 else "< 0.001 %"

@@ -1,0 +1,67 @@
+"""Limits of the six extremes against failure probability, gains random alone and together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from maglev.figures import curves, labels, style
+
+_MARKERS = ("o", "s", "^", "D")
+
+
+def figure(
+    limits: Sequence[xr.Dataset], designs: Sequence[xr.Dataset]
+) -> tuple[Figure, xr.Dataset]:
+    """Draw the limits, a line per case, with their intervals.
+
+    Parameters
+    ----------
+    limits
+        Layout ``limits``, one per case.
+    designs
+        Layout ``design`` (or ``runs`` of a baseline), of the same cases in the same order.
+
+    Returns
+    -------
+    figure, plotted
+        The figure and the numbers in it.
+    """
+    found = curves.limits(limits)
+    levels = found["failure_probability"].to_numpy()
+    handles, words, looks = [], [], []
+    for number, (one, design) in enumerate(zip(limits, designs, strict=True)):
+        parameters = labels.gains_of(design)
+        name, look = labels.case_style(parameters)
+        marker = _MARKERS[parameters[0]] if len(parameters) == 1 else "v"
+        looks.append({**look, "marker": marker})
+        lost = labels.percent(float(one["lost_probability"]))
+        words.append(f"{name}, {int(found['curve_n_runs'][number])} runs, lost {lost}")
+        handles.append(Line2D([], [], **looks[-1], ms=3.5))
+    fig, axes = style.panels(2, 3, style.PAGE, 4.7)
+    any_instead = False
+    for response, axis in enumerate(axes):
+        ends, instead = curves.finite_ends(found, response)
+        any_instead |= bool(instead.any())
+        for number, look in enumerate(looks):
+            apart = 1.06 ** (number - 0.5 * (len(looks) - 1))
+            own = {end: values[number] for end, values in ends.items()}
+            curves.draw_limits(axis, levels * apart, own, instead[number], look)
+        axis.set_xscale("log")
+        axis.set_xlim(1.7 * levels.max(), levels.min() / 1.7)
+        axis.set_xticks(levels, [f"{level:g}" for level in levels], minor=False)
+        axis.minorticks_off()
+        axis.set_ylabel(f"limit, {labels.SHOWN[response].axis}")
+        axis.set_xlabel("failure probability [-]")
+        style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
+    if any_instead:
+        handles.append(Line2D([], [], ls="", marker="o", ms=3.5, mfc="white", color=style.QUIET))
+        words.append("hollow: given that levitation holds (losses are likelier)")
+    variation, n_spans = labels.settings(designs[0])
+    intervals = f"intervals: {labels.confidence(limits[0])}"
+    title = f"random ({n_spans} spans, coefficient of variation {variation:.2f}); {intervals}"
+    style.below(fig, handles, words, ncols=2, title=title, title_fontsize=7)
+    return fig, found

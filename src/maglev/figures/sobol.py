@@ -1,0 +1,76 @@
+"""Which gain matters for which response: Sobol' indices of the surrogate."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from maglev.figures import labels, style
+
+
+def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
+    """Draw first-order and total indices of every gain and response with their intervals.
+
+    Parameters
+    ----------
+    data
+        Layout ``surrogate``.
+
+    Returns
+    -------
+    figure, plotted
+        The figure and the numbers in it.
+    """
+    gains = labels.gains_of(data)
+    place = np.arange(len(gains))[::-1]
+    colours = [labels.GAIN_COLOUR[number] for number in gains]
+    fig, axes = style.panels(2, 3, style.PAGE, 3.9)
+    for response, axis in enumerate(axes):
+        at = data.isel(response=response)
+        for name, shift, filled in (("sobol_first", 0.2, True), ("sobol_total", -0.2, False)):
+            middle = at[name].to_numpy()
+            reach = np.abs([middle - at[f"{name}_low"], at[f"{name}_high"] - middle])
+            axis.barh(
+                place + shift,
+                middle,
+                height=0.36,
+                color=colours if filled else "white",
+                edgecolor=colours,
+                lw=0.8,
+                xerr=reach,
+                error_kw={"elinewidth": 0.8, "capsize": 1.5, "ecolor": "#000000"},
+            )
+        axis.set_yticks(place, [labels.GAIN[number] for number in gains])
+        axis.grid(visible=False, axis="y")
+        axis.set_xlim(0, 1.05)
+        error = float(at["leave_one_out_error"])
+        style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
+        axis.annotate(
+            f"surrogate's error {error:.2f} σ",
+            (0.98, 0.03),
+            xycoords="axes fraction",
+            ha="right",
+            fontsize=6.5,
+        )
+        if response % 3:
+            axis.set_yticklabels([])
+        if response >= 3:
+            axis.set_xlabel("share of the variance [-]")
+    handles = [
+        Patch(facecolor=style.QUIET, edgecolor=style.QUIET),
+        Patch(facecolor="white", edgecolor=style.QUIET),
+    ]
+    confidence = labels.confidence(data)
+    words = ["first order: the gain alone", "total: with all its interactions"]
+    style.below(
+        fig,
+        handles,
+        words,
+        ncols=2,
+        title=f"bars: {confidence} intervals of the sampling, without the surrogate's error",
+        title_fontsize=7,
+    )
+    shown = [name for name in data.data_vars if str(name).startswith("sobol")]
+    return fig, data[[*shown, "leave_one_out_error"]]

@@ -1,0 +1,109 @@
+"""Which gains of the suspension hold the train: linearised map, and the runs that were lost."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from maglev.datasets import STATUS
+from maglev.figures import labels, style
+
+_LOST = "#D55E00"
+_MARKERS = {1: "x", 2: "+", 3: "*"}
+
+
+def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]:
+    """Draw growth rate, its border and the static limit, with the runs on them.
+
+    Parameters
+    ----------
+    stability
+        Layout ``stability``.
+    runs
+        Layout ``runs``: the baseline of a case.
+
+    Returns
+    -------
+    figure, plotted
+        The figure and the numbers in it.
+    """
+    status = runs["status"].to_numpy()
+    k_p, k_d = (
+        runs[f"suspension_{kind}_gain"].to_numpy() for kind in ("proportional", "derivative")
+    )
+    x, y = stability["grid_proportional"].to_numpy(), stability["grid_derivative"].to_numpy()
+    growth = stability["growth_rate"].to_numpy()
+    static = float(stability["static_limit"])
+
+    fig, (chart, count) = style.panels(1, 2, style.PAGE, 3.1)
+    unstable = np.ma.masked_less_equal(growth, 0.0)
+    filled = chart.contourf(x, y, unstable, levels=8, cmap="Oranges", alpha=0.55)
+    fig.colorbar(filled, ax=chart, label="growth rate [1/s]", shrink=0.9)
+    size = 1.2 if status.size > 2000 else 2.5
+    held = status == 0
+    look = {"ms": size, "mew": 0, "color": "#0072B2", "alpha": 0.5, "rasterized": True}
+    chart.plot(k_p[held], k_d[held], ".", **look)
+    for code, marker in _MARKERS.items():
+        chosen = status == code
+        if chosen.any():
+            word = f"lost: {STATUS[code].replace('_', ' ')}"
+            look = {"ls": "", "marker": marker, "ms": 4, "mew": 0.8, "color": "#000000"}
+            chart.plot(k_p[chosen], k_d[chosen], **look, label=word)
+    chart.contour(x, y, growth, levels=[0.0], colors=[_LOST], linewidths=1.2)
+    chart.axvline(static, color="#000000", ls="--", lw=0.9)
+    chart.plot(
+        float(stability["mean_proportional"]), float(stability["mean_derivative"]), "P",
+        color="white", mec="#000000", mew=0.6, ms=6,
+    )  # fmt: skip
+    chart.set(xlabel="suspension $k_p$ [A/m]", ylabel="suspension $k_d$ [A s/m]")
+    chart.set(xlim=_around(np.append(k_p, static), x), ylim=_around(k_d, y))
+    chart.grid(visible=False)
+
+    edges = np.linspace(k_p.min(), k_p.max(), 41)
+    away = status != 0
+    held_count, lost_count = (np.histogram(k_p[chosen], edges)[0] for chosen in (~away, away))
+    count.stairs(held_count, edges, color="#0072B2", fill=True, alpha=0.5, label="held")
+    count.stairs(lost_count, edges, color="#000000", fill=True, label="lost")
+    count.axvline(static, color="#000000", ls="--", lw=0.9)
+    border = _border(x, growth[int(np.abs(y - float(stability["mean_derivative"])).argmin())])
+    count.axvline(border, color=_LOST, lw=1.2)
+    count.set(yscale="log", ylim=(0.7, None), xlim=_around(np.append(k_p, static), x))
+    count.set(xlabel="suspension $k_p$ [A/m]", ylabel="runs")
+
+    variation, _ = labels.settings(runs)
+    n, n_lost = status.size, int(away.sum())
+    style.titled(chart, "a", f"{n} runs, coefficient of variation {variation:.2f}")
+    style.titled(count, "b", f"lost {n_lost} of {n} ({labels.percent(n_lost / n)})")
+    handles, words = chart.get_legend_handles_labels()
+    handles += [
+        Line2D([], [], color="#0072B2", ls="", marker=".", ms=4),
+        Line2D([], [], color="#000000", ls="--", lw=0.9),
+        Line2D([], [], color=_LOST, lw=1.2),
+        Line2D([], [], color="white", mec="#000000", mew=0.6, ls="", marker="P", ms=6),
+    ]
+    words += [
+        "held",
+        f"static limit $i_0/\\delta_0$ = {static:.0f} A/m",
+        f"border of the linearised train, {border:.0f} A/m at the mean $k_d$",
+        "mean gains",
+    ]
+    style.below(fig, handles, words, ncols=3)
+    gains = runs[["suspension_proportional_gain", "suspension_derivative_gain", "status"]]
+    return fig, xr.merge([stability, gains])
+
+
+def _around(gains: np.ndarray, grid: np.ndarray) -> tuple[float, float]:
+    """Range of the runs with a margin, within that of the map."""
+    margin = 0.06 * np.ptp(gains)
+    return max(gains.min() - margin, grid.min()), min(gains.max() + margin, grid.max())
+
+
+def _border(gain: np.ndarray, growth: np.ndarray) -> float:
+    """Largest gain at which the growth rate passes zero, NaN if it never does."""
+    grows = np.flatnonzero(growth > 0)
+    if grows.size == 0 or grows[-1] + 1 == gain.size:
+        return float("nan")
+    k = int(grows[-1])
+    return float(np.interp(0.0, -growth[k : k + 2], gain[k : k + 2]))

@@ -1,0 +1,81 @@
+"""How well each method predicts the runs of the baseline, run by run."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from maglev.datasets import METHODS
+from maglev.parameters import Config
+from maglev.stages.extremes import coordinates, extremes, lost, method_number
+from maglev.stages.surrogate import stored_predictor
+
+_LOG = logging.getLogger(__name__)
+
+
+def dataset(
+    config: Config,
+    baseline: xr.Dataset,
+    designs: Mapping[str, xr.Dataset],
+    surrogates: Mapping[str, xr.Dataset],
+) -> xr.Dataset:
+    """Predict every run of the baseline by the surrogate of every method.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    baseline
+        Layout ``runs``.
+    designs
+        Layout ``design``, by method.
+    surrogates
+        Layout ``surrogate``, by method, of these designs.
+
+    Returns
+    -------
+    dataset
+        Layout ``prediction``.  ``computed`` is NaN where the run lost levitation; extremes are
+        predicted there too and mean nothing.
+
+    Raises
+    ------
+    ValueError
+        If a method has a design and no surrogate, or the other way round.
+    """
+    if set(designs) != set(surrogates):
+        raise ValueError(
+            f"every method needs a design and a surrogate, got designs of {sorted(designs)} and "
+            f"surrogates of {sorted(surrogates)}"
+        )
+    names = sorted(designs, key=METHODS.index)
+    truth, away = extremes(baseline), lost(baseline)
+    points = baseline["standard"].to_numpy()
+    sigma = truth[~away].std(axis=0)
+    predicted, without = [], []
+    for name in names:
+        found = stored_predictor(config, designs[name], surrogates[name])
+        predicted.append(found.surrogate.predict(points))
+        without.append(~found.held(points))
+        _LOG.info(
+            "%s: %d runs lost, %d predicted so", name, np.count_nonzero(away), without[-1].sum()
+        )
+    rmse = [np.sqrt(np.mean((one - truth)[~away] ** 2, axis=0)) / sigma for one in predicted]
+    return xr.Dataset(
+        {
+            "computed": (("sample", "response"), truth),
+            "status": ("sample", baseline["status"].to_numpy()),
+            "predicted_by": (("method", "sample", "response"), np.array(predicted)),
+            "lost_by": (("method", "sample"), np.array(without, dtype=np.int8)),
+            "prediction_rmse": (("method", "response"), np.array(rmse)),
+            "method_n_runs": ("method", [designs[name].sizes["sample"] for name in names]),
+            "sigma": ("response", sigma),
+        },
+        coords=coordinates(
+            method=np.array([method_number(name) for name in names]),
+            sample=baseline["sample"].to_numpy(),
+        ),
+    )

@@ -1,0 +1,276 @@
+"""Small files of the study, as the stages would write them, for the figures to be drawn from."""
+
+import numpy as np
+import xarray as xr
+from scipy import stats
+
+from maglev import datasets
+from maglev.datasets import GAINS, LAYOUTS, RESPONSES, VARIABLES
+
+LEVELS = (0.1, 0.01, 0.001)
+MEAN = np.array([3500.0, 17.5, 4500.0, 17.5])
+CENTRE = np.array([1.5e-3, 1e-4, 0.5, 0.3, 0.2, 0.4])
+WIDTH = np.array([6e-6, 8e-6, 0.05, 0.03, 0.02, 0.05])
+
+
+def _filled(layout, sizes, **given):
+    """A dataset of a layout: what is given, and zeros for the rest."""
+    data = dict(given)
+    for name in LAYOUTS[layout].variables:
+        if name not in data:
+            dims = VARIABLES[name].dims
+            data[name] = (dims, np.zeros([sizes[dim] for dim in dims]))
+    data = {
+        name: (dims, np.asarray(v).astype(VARIABLES[name].dtype))
+        for name, (dims, v) in data.items()
+    }
+    coords = {
+        dim: np.arange(size)
+        for dim, size in sizes.items()
+        if any(dim in d for d, _ in data.values())
+    }
+    for name in list(data):
+        if name in coords:
+            coords[name] = data.pop(name)[1]
+    if "failure_probability" in coords:
+        coords["failure_probability"] = np.array(LEVELS)[: sizes["failure_probability"]]
+    return xr.Dataset(data, coords=coords)
+
+
+def runs(n=400, *, variation=0.1, parameters=(0, 1, 2, 3), seed=1):
+    """Independent runs of which those with the smallest suspension gain are lost."""
+    rng = np.random.default_rng(seed)
+    standard = rng.standard_normal((n, len(parameters)))
+    gains = np.tile(MEAN, (n, 1))
+    gains[:, parameters] *= 1 + variation * standard
+    values = CENTRE + 10 * variation * WIDTH * rng.standard_normal((n, 6))
+    values[:, 4] += 0.02 * rng.exponential(size=n) ** 2
+    away = gains[:, 0] < 2650.0
+    values[away] = np.nan
+    given = {name: ("sample", gains[:, k]) for k, name in enumerate(GAINS)}
+    given |= {name: ("sample", values[:, k]) for k, name in enumerate(RESPONSES)}
+    given |= {
+        "standard": (("sample", "parameter"), standard),
+        "status": ("sample", np.where(away, 2, 0)),
+        "parameter": ("parameter", np.array(parameters)),
+    }
+    return _filled("runs", {"sample": n, "car": 1, "parameter": len(parameters)}, **given)
+
+
+def design(n=24, n_rounds=4, **options):
+    """A design whose errors fall from round to round."""
+    made = runs(n, **options)
+    fall = 0.5 ** np.arange(n_rounds)[:, None]
+    given = {name: (made[name].dims, made[name].to_numpy()) for name in made.variables}
+    given |= {
+        "round_n_runs": ("round", np.linspace(n / 2, n, n_rounds).astype(int)),
+        "error": (("round", "response"), np.where(fall == 1, np.nan, fall * np.ones(6))),
+        "rmse": (("round", "response"), fall * WIDTH),
+        "decision": ("round", np.zeros(n_rounds)),
+    }
+    sizes = {
+        "sample": n, "car": 1, "parameter": made.sizes["parameter"], "round": n_rounds,
+        "response": 6, "failure_probability": 3,
+    }  # fmt: skip
+    return _filled("design", sizes, **given)
+
+
+def density(method="asm", *, variation=0.1, lost=0.003, shift=0.0, n=400):
+    """Normal densities, that of a baseline with a band and without the GDEE."""
+    z = np.linspace(-4.5, 4.5, 121)
+    width = 10 * variation * WIDTH[:, None]
+    value = CENTRE[:, None] + width * (z + shift)
+    of = (1 - lost) * stats.norm.pdf(z) / width
+    beyond = lost + (1 - lost) * stats.norm.sf(z) * np.ones((6, 1))
+    mcm = method == "mcm"
+    by_cell, by_response = ("response", "cell"), ("response",)
+    given = {
+        "value": (by_cell, value),
+        "density": (by_cell, np.full_like(of, np.nan) if mcm else of),
+        "density_direct": (by_cell, of),
+        "exceedance": (by_cell, beyond),
+        "exceedance_low": (by_cell, 0.8 * beyond),
+        "exceedance_high": (by_cell, np.minimum(1.2 * beyond, 1)),
+        "bandwidth": (by_response, 0.2 * width[:, 0]),
+        "mesh_size": (by_response, np.nan * CENTRE if mcm else 0.1 * width[:, 0]),
+        "density_method": (by_response, np.full(6, 2 if mcm else 0)),
+        "peak": (by_response, np.nan * CENTRE if mcm else of.max(axis=1)),
+        "peak_direct": (by_response, of.max(axis=1)),
+        "lost_probability": ((), lost),
+        "n_runs": ((), n),
+    }
+    if mcm:
+        given |= {
+            f"density_direct_{end}": (by_cell, factor * of)
+            for end, factor in (("low", 0.9), ("high", 1.1))
+        }
+    return _filled("density", {"response": 6, "cell": z.size}, **given)
+
+
+def limits(*, variation=0.1, lost=0.003, n=104):
+    """Limits of which the rarest do not exist, as losses alone are likelier."""
+    z = stats.norm.isf(LEVELS)
+    held = CENTRE[:, None] + 10 * variation * WIDTH[:, None] * z
+    half = 0.3 * variation * 10 * WIDTH[:, None] * np.ones(3)
+    infinite = np.tile(np.array(LEVELS) < lost, (6, 1))
+    by_level = ("response", "failure_probability")
+    given = {"held_limit": (by_level, held), "limit": (by_level, np.where(infinite, np.inf, held))}
+    for end, sign in (("low", -1), ("high", 1)):
+        given[f"held_limit_{end}"] = (by_level, held + sign * half)
+        given[f"limit_{end}"] = (by_level, np.where(infinite, np.inf, held + sign * half))
+    given["limit_status"] = (by_level, np.where(infinite, 2, 0))
+    given["lost_probability"] = ((), lost)
+    given["n_runs"] = ((), n)
+    return _filled("limits", {"response": 6, "failure_probability": 3}, **given)
+
+
+def accuracy(methods=(1, 2, 3)):
+    """Errors that fall with the number of runs."""
+    n_runs = np.tile(np.array([8, 12, 16, 24]), (len(methods), 1))
+    fall = (2.0 / n_runs**0.5)[:, :, None] * np.ones(6)
+    by_step = ("method", "step")
+    given = {
+        "step_n_runs": (by_step, n_runs),
+        "step_rmse": ((*by_step, "response"), fall * WIDTH),
+        "step_error": ((*by_step, "response"), 3 * fall),
+        "step_held_limit_error": (
+            (*by_step, "response", "failure_probability"), fall[..., None] * np.array([0.1, 0.3, 1])
+        ),
+        "reference_held_half_width": (
+            ("response", "failure_probability"), np.tile([0.02, 0.05, 0.1], (6, 1))
+        ),
+        "sigma": ("response", WIDTH),
+        "method": ("method", np.array(methods)),
+    }  # fmt: skip
+    sizes = {"method": len(methods), "step": 4, "response": 6, "failure_probability": 3}
+    return _filled("accuracy", sizes, **given)
+
+
+def prediction(n=300, methods=(1, 2, 3)):
+    """Predictions with an error of a tenth of a deviation."""
+    rng = np.random.default_rng(3)
+    made = runs(n)
+    computed = np.column_stack([made[name] for name in RESPONSES])
+    error = 0.1 * WIDTH * rng.standard_normal((len(methods), n, 6))
+    away = made["status"].to_numpy() != 0
+    given = {
+        "computed": (("sample", "response"), computed),
+        "status": ("sample", made["status"].to_numpy()),
+        "predicted_by": (("method", "sample", "response"), np.nan_to_num(computed) + error),
+        "lost_by": (("method", "sample"), np.tile(away, (len(methods), 1)).astype(int)),
+        "prediction_rmse": (("method", "response"), np.full((len(methods), 6), 0.1)),
+        "method_n_runs": ("method", np.full(len(methods), 24)),
+        "sigma": ("response", WIDTH),
+        "method": ("method", np.array(methods)),
+    }
+    return _filled("prediction", {"method": len(methods), "sample": n, "response": 6}, **given)
+
+
+def surrogate():
+    """Sobol' indices of which the first gain has most."""
+    share = np.tile([0.7, 0.1, 0.15, 0.02], (6, 1))
+    by_gain = ("response", "parameter")
+    given = {}
+    for name, of in (("sobol_first", share), ("sobol_total", share + 0.05)):
+        for end, by in (("", 0.0), ("_low", -0.02), ("_high", 0.02)):
+            given[f"{name}{end}"] = (by_gain, of + by)
+    given["leave_one_out_error"] = ("response", np.full(6, 0.1))
+    return _filled("surrogate", {"response": 6, "parameter": 4}, **given)
+
+
+def stability():
+    """A border at 2600 A/m."""
+    k_p, k_d = np.linspace(1400, 5600, 15), np.linspace(7, 28, 8)
+    given = {
+        "growth_rate": (
+            ("grid_derivative", "grid_proportional"), np.tile((2600 - k_p) / 100, (k_d.size, 1))
+        ),
+        "static_limit": ((), 2500.0),
+        "mean_proportional": ((), MEAN[0]),
+        "mean_derivative": ((), MEAN[1]),
+        "grid_proportional": ("grid_proportional", k_p),
+        "grid_derivative": ("grid_derivative", k_d),
+    }  # fmt: skip
+    sizes = {"grid_proportional": k_p.size, "grid_derivative": k_d.size}
+    return _filled("stability", sizes, **given)
+
+
+def track_split():
+    """Three normal densities."""
+    z = np.linspace(-5, 5, 121)
+    given = {"value": (("response", "cell"), CENTRE[:, None] + WIDTH[:, None] * z)}
+    for name, width in (("both", 1.0), ("gains_only", 0.4), ("track_only", 0.9)):
+        of = stats.norm.pdf(z / width) / width / WIDTH[:, None]
+        given[f"density_{name}"] = (("response", "cell"), of)
+    for name, share in (("gains", 0.2), ("track", 0.7), ("interaction", 0.1)):
+        for end, by in (("", 0.0), ("_low", -0.1), ("_high", 0.1)):
+            given[f"{name}_share{end}"] = ("response", np.full(6, share + by))
+    given["n_runs"] = ((), 500)
+    return _filled("track_split", {"response": 6, "cell": z.size}, **given)
+
+
+def write(folder, layout, dataset, *, case, method=None, variation=0.1, demonstration=False):
+    """Write a file as its stage would and return its name."""
+    path = folder / f"{layout}_{case}_{method}.nc"
+    config = {
+        "demonstration": demonstration,
+        "study": {"confidence": 0.95},
+        "cases": {case: {"coefficient_of_variation": variation, "n_spans": 5}},
+    }
+    attributes = {"case": case} | ({} if method is None else {"method": method})
+    datasets.write(dataset.assign_attrs(attributes), path, layout, config=config, code="abc")
+    return path
+
+
+def study(folder, demonstration=False):
+    """Files of every figure of the study, by its name."""
+
+    def one(layout, dataset, case="validation", method=None, variation=0.1):
+        return write(
+            folder, layout, dataset, case=case, method=method, variation=variation,
+            demonstration=demonstration,
+        )  # fmt: skip
+
+    by_method = [
+        one("density", density("mcm"), method="mcm"),
+        one("density", density("osm", shift=0.2), method="osm"),
+        one("density", density("asm"), method="asm"),
+    ]
+    gains = {"only_a": (0,), "only_b": (3,), "all_gains": (0, 1, 2, 3)}
+    of_gain = [
+        (
+            one("density", density(variation=v), case, "asm"),
+            one("limits", limits(variation=v), case, "asm"),
+            one("design", design(parameters=parameters), case, "asm"),
+        )
+        for (case, parameters), v in zip(gains.items(), (0.09, 0.01, 0.1), strict=True)
+    ]
+    of_variation = [
+        (
+            one("density", density(variation=v, lost=lost), f"cov_{k}", "asm", v),
+            one("limits", limits(variation=v, lost=lost), f"cov_{k}", "asm", v),
+            one("design", design(variation=v), f"cov_{k}", "asm", v),
+        )
+        for k, (v, lost) in enumerate(((0.14, 0.02), (0.04, 0.0), (0.1, 0.003)))
+    ]
+    accurate = one("accuracy", accuracy())
+    baseline = one("runs", runs(), method="mcm")
+    designs = [
+        one("design", design(n_rounds=1), method="osm"), one("design", design(), method="asm")
+    ]  # fmt: skip
+    by_gain, by_variation = list(zip(*of_gain, strict=True)), list(zip(*of_variation, strict=True))
+    return {
+        "training": [accurate, *designs],
+        "prediction": [one("prediction", prediction())],
+        "density_by_method": by_method,
+        "exceedance_by_method": by_method,
+        "density_by_gain": [*by_gain[0], *by_gain[2]],
+        "limits_by_gain": [*by_gain[1], *by_gain[2]],
+        "density_by_variation": [*by_variation[0], *by_variation[2]],
+        "limits_by_variation": [*by_variation[1], *by_variation[2]],
+        "sobol": [one("surrogate", surrogate(), method="asm")],
+        "stability": [one("stability", stability()), baseline],
+        "accuracy": [accurate],
+        "scatter": [baseline],
+        "track_split": [one("track_split", track_split())],
+    }

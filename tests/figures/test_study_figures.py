@@ -1,0 +1,111 @@
+"""Figures of the study draw from small files, show what those hold, and refuse what is missing."""
+
+import numpy as np
+import pytest
+import study_files
+import xarray as xr
+from numpy.testing import assert_allclose
+from test_figures import VALIDATION
+
+from maglev import datasets
+from maglev.figures import FIGURES, curves, draw, labels, layouts_of
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    return study_files.study(tmp_path_factory.mktemp("study"))
+
+
+@pytest.mark.parametrize("name", [name for name in FIGURES if name not in VALIDATION])
+def test_a_figure_of_the_study_is_drawn_with_its_numbers(tmp_path, files, name):
+    draw(name, files[name], tmp_path / "one")
+    for ending in ("png", "pdf", "nc"):
+        assert (tmp_path / f"one.{ending}").stat().st_size > 5000
+    with xr.open_dataset(tmp_path / "one.nc") as plotted:
+        inputs = [key for key in plotted.attrs if key.startswith("input_")]
+        assert len(inputs) == len(files[name])
+        for variable in plotted.variables:
+            assert "long_name" in plotted[variable].attrs, variable
+        assert plotted.attrs["demonstration"] == "no"
+
+
+def test_the_same_figure_is_the_same_bytes(tmp_path, files):
+    for out in ("one", "two"):
+        draw("limits_by_gain", files["limits_by_gain"], tmp_path / out)
+    for ending in ("png", "pdf", "nc"):
+        first, second = ((tmp_path / f"{out}.{ending}").read_bytes() for out in ("one", "two"))
+        assert first == second, ending
+
+
+def test_a_star_takes_as_many_files_of_each_layout():
+    assert layouts_of("limits_by_gain", 4) == [("limits",) * 2, ("design",) * 2]
+    assert layouts_of("training", 3) == [("accuracy",), ("design",) * 2]
+    for name, n in (("limits_by_gain", 3), ("limits_by_gain", 0), ("training", 1), ("sobol", 2)):
+        with pytest.raises(ValueError, match=f"figure {name} is drawn from .* got {n}"):
+            layouts_of(name, n)
+
+
+def test_peaks_are_compared_with_the_baseline_and_need_one(tmp_path, files):
+    draw("density_by_method", files["density_by_method"], tmp_path / "f")
+    with xr.open_dataset(tmp_path / "f.nc") as plotted:
+        meanings = plotted["curve"].attrs["flag_meanings"].split()
+        assert meanings == ["validation-mcm", "validation-osm", "validation-asm"]
+        peak = plotted["curve_peak"].to_numpy()
+        assert_allclose(plotted["curve_peak_error"], peak / peak[0] - 1, atol=1e-12)
+    for name in ("density_by_method", "exceedance_by_method"):
+        with pytest.raises(ValueError, match="no baseline"):
+            draw(name, files["density_by_method"][1:], tmp_path / "g")
+
+
+def read(paths, layout):
+    return [datasets.read(path, layout) for path in paths]
+
+
+def test_where_losses_are_likelier_the_limit_given_levitation_is_shown(files):
+    paths = files["limits_by_variation"]
+    found = curves.limits(read(paths[: len(paths) // 2], "limits"))
+    ends, instead = curves.finite_ends(found, 0)
+    lost = found["curve_lost_probability"].to_numpy()
+    expected = lost[:, None] > np.array(study_files.LEVELS)
+    np.testing.assert_array_equal(instead, expected)
+    held = 1e3 * found["curve_held_limit"].isel(response=0).to_numpy()
+    assert_allclose(ends[""][expected], held[expected])
+    assert np.isfinite(ends[""]).all()
+
+
+def test_a_limit_that_the_sample_does_not_carry_is_not_shown(tmp_path, files):
+    (one,) = read(files["limits_by_gain"][:1], "limits")
+    one["limit_status"][0, 2] = 1
+    ends, instead = curves.finite_ends(curves.limits([one]), 0)
+    assert np.isnan(ends[""][0, 2])
+    assert not instead[0, 2]
+
+
+def test_cases_are_put_in_order_of_their_variation(tmp_path, files):
+    draw("limits_by_variation", files["limits_by_variation"], tmp_path / "f")
+    with xr.open_dataset(tmp_path / "f.nc") as plotted:
+        assert_allclose(plotted["curve_variation"], [0.04, 0.1, 0.14])
+        assert_allclose(plotted["curve_lost_probability"], [0.0, 0.003, 0.02])
+
+
+def test_the_error_of_a_round_stands_at_the_runs_before_it(tmp_path, files):
+    draw("training", files["training"], tmp_path / "f")
+    design = datasets.read(files["training"][2], "design")
+    with xr.open_dataset(tmp_path / "f.nc") as plotted:
+        asm = plotted.isel(curve=1)
+        np.testing.assert_array_equal(asm["curve_round_n_runs"], design["round_n_runs"])
+        assert_allclose(asm["curve_error"][:-1], design["error"][1:])
+        assert np.isnan(asm["curve_error"][-1]).all()
+
+
+def test_a_range_holds_the_body_and_leaves_out_the_tail(files):
+    found = curves.densities(read(files["density_by_method"][:1], "density"))
+    low, high = curves.body(found, 2, 5e-3)
+    width = study_files.WIDTH[2]
+    assert study_files.CENTRE[2] - 4.5 * width < low < study_files.CENTRE[2] - 2.3 * width
+    assert study_files.CENTRE[2] + 2.3 * width < high < study_files.CENTRE[2] + 4.5 * width
+
+
+def test_shares_are_written_with_two_digits():
+    assert [labels.percent(one) for one in (0.0, 0.0031, 0.25)] == ["0 %", "0.31 %", "25 %"]
+    assert labels.percent(1e-7) == "< 0.001 %"
