@@ -58,6 +58,7 @@ def test_another_largest_number_of_runs_continues_or_shortens(train, tmp_path, m
     xr.testing.assert_identical(again, few)
     shortened = many.isel(sample=slice(n), round=slice(few.sizes["round"]))
     xr.testing.assert_equal(shortened.drop_vars("decision"), few.drop_vars("decision"))
+    assert len(list(tmp_path.glob("rounds/validation/*/*"))) == 1  # one and the same history
     assert few.attrs["stopped"] == "largest number of runs"
     assert_array_equal(few["decision"], [0] * (few.sizes["round"] - 1) + [3])
 

@@ -329,8 +329,8 @@ class _Design:
                 n_largest=largest,
             )
             return {None: _GO_ON, "error below threshold": _SMALL_ERROR}.get(reason, _LARGEST)
-        last = np.array(changes[-settings.n_rounds :])
-        if len(changes) > settings.n_rounds and (last <= settings.threshold).all():
+        # the change of the first design is NaN, which is not small
+        if (np.array(changes[-settings.n_rounds :]) <= settings.threshold).all():
             return _SETTLED
         return _LARGEST if state.lost.size >= largest else _GO_ON
 
