@@ -42,6 +42,7 @@ wildcard_constraints:
     method="|".join(METHODS),
 
 
+include: "workflow/rules/common.smk"
 include: "workflow/rules/config.smk"
 include: "workflow/rules/track.smk"
 include: "workflow/rules/validation.smk"

@@ -2,20 +2,6 @@
 # the file with its part, which is rewritten only when one of its values changes.
 
 
-import re
-
-
-def stages(needs: str, lacks: str) -> str:
-    """Pattern of the stages that read something of a case or a method, and nothing of another."""
-    found = (
-        re.escape(stage)
-        for stage, sections in SECTIONS.items()
-        if any(needs in one for one in sections)
-        and not any(lacks in one for one in sections)
-    )
-    return "|".join(found)
-
-
 rule run_config:
     output:
         "<results>/run_config.yaml",

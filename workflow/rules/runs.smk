@@ -2,34 +2,6 @@
 # of any rule: a job that is killed leaves there what it has done.
 
 
-STORE = f"results/.store/{config['run']}"
-CHUNK = parameters.study.mcm.chunk_size
-PROFILE = config["irregularity"]["profile_file"] or []
-
-
-def n_samples(case: str) -> int:
-    """Number of runs of the baseline of a case."""
-    return parameters.cases[case].n_samples or parameters.study.mcm.n_samples
-
-
-def chunks(wildcards) -> list[str]:
-    """Files of the baseline of a case."""
-    n = -(-n_samples(wildcards.case) // CHUNK)
-    return [f"<results>/{wildcards.case}/mcm/chunk_{k:03d}.nc" for k in range(n)]
-
-
-def runs_of_all_cases() -> list[str]:
-    """Baselines and designs of all cases by the methods that they name."""
-    files = []
-    for name, case in parameters.cases.items():
-        for method in case.methods:
-            file = "mcm.nc" if method == "mcm" else f"{method}/design.nc"
-            files.append(f"<results>/{name}/{file}")
-        if case.random_track:
-            files += [f"<results>/{name}/track/{part}.nc" for part in TRACK_PARTS]
-    return files
-
-
 rule mcm_chunk:
     input:
         config="<results>/{case}/config/runs.yaml",
@@ -103,25 +75,6 @@ rule track_runs:
     shell:
         "maglev track-runs --config {input.config} --case {wildcards.case} "
         "--part {wildcards.part} --store {params.store} --threads {threads} --out {output} 2> {log}"
-
-
-def initial(wildcards) -> str:
-    """Points of the first design of a method."""
-    name = "osm" if wildcards.method == "osm" else f"initial_{wildcards.method}"
-    return f"<results>/{wildcards.case}/points/{name}.nc"
-
-
-def candidates(wildcards) -> list[str]:
-    """Points that the rounds of a method choose from, none for a method without rounds."""
-    if wildcards.method == "osm":
-        return []
-    return [f"<results>/{wildcards.case}/points/candidates_{wildcards.method}.nc"]
-
-
-def baseline(wildcards) -> list[str]:
-    """Runs that the rounds are compared with, if the case has them."""
-    has_one = "mcm" in parameters.cases[wildcards.case].methods
-    return [f"<results>/{wildcards.case}/mcm.nc"] if has_one else []
 
 
 rule design:
