@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import study_files
 import xarray as xr
+from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 from test_figures import VALIDATION
 
@@ -61,24 +62,27 @@ def read(paths, layout):
     return [datasets.read(path, layout) for path in paths]
 
 
-def test_where_losses_are_likelier_the_limit_given_levitation_is_shown(files):
+def test_where_losses_are_likelier_only_the_limit_given_levitation_is_shown(files):
     paths = files["limits_by_variation"]
     found = curves.limits(read(paths[: len(paths) // 2], "limits"))
-    ends, instead = curves.finite_ends(found, 0)
     lost = found["curve_lost_probability"].to_numpy()
-    expected = lost[:, None] > np.array(study_files.LEVELS)
-    np.testing.assert_array_equal(instead, expected)
-    held = 1e3 * found["curve_held_limit"].isel(response=0).to_numpy()
-    assert_allclose(ends[""][expected], held[expected])
-    assert np.isfinite(ends[""]).all()
+    likelier = lost[:, None] > np.array(study_files.LEVELS)
+    at = curves.in_shown_unit(found, 0)
+    np.testing.assert_array_equal(np.isinf(at["curve_limit"]), likelier)
+    assert np.isfinite(at["curve_held_limit"]).all()
+    assert_allclose(at["curve_held_limit"], 1e3 * found["curve_held_limit"].isel(response=0))
+    assert curves.differ(found)
+    axis = Figure().subplots()
+    one = at.isel(curve=0)  # two of three levels have no limit
+    curves.draw_limits(axis, np.arange(3.0), one, {"color": "#000000", "ls": "-", "marker": "o"})
+    shown = [len(line.get_xdata()) for line in axis.get_lines() if line.get_marker() == "o"]
+    assert shown == [3, int(np.isfinite(one["curve_limit"]).sum())]
 
 
-def test_a_limit_that_the_sample_does_not_carry_is_not_shown(tmp_path, files):
+def test_a_limit_that_the_sample_does_not_carry_is_not_shown(files):
     (one,) = read(files["limits_by_gain"][:1], "limits")
-    one["limit_status"][0, 2] = 1
-    ends, instead = curves.finite_ends(curves.limits([one]), 0)
-    assert np.isnan(ends[""][0, 2])
-    assert not instead[0, 2]
+    one["limit_status"][0, 0] = 1
+    assert np.isnan(curves.limits([one])["curve_limit"][0, 0, 0])
 
 
 def test_cases_are_put_in_order_of_their_variation(tmp_path, files):

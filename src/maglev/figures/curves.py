@@ -127,16 +127,19 @@ def draw_densities(
             axis.fill_between(value, low, high, color=str(look["color"]), alpha=0.18, lw=0)
         axis.plot(value, one["curve_density"] / shown.scale, **look)
     beyond = [k for k in range(len(styles)) if peaks[k] > top]
+    if beyond:
+        top *= 1.0 + 0.1 * len(beyond)
     for row, k in enumerate(sorted(beyond, key=lambda k: -peaks[k])):
         axis.text(
             0.98,
             0.97 - 0.1 * row,
-            f"peak {peaks[k]:.3g}",
+            f"peak {peaks[k]:,.0f}" if peaks[k] >= 1e3 else f"peak {peaks[k]:.3g}",
             color=str(styles[k]["color"]),
             transform=axis.transAxes,
             ha="right",
             va="top",
             fontsize=6.5,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
         )
     axis.set_ylim(0, top)
     axis.locator_params(axis="x", nbins=5)
@@ -144,62 +147,65 @@ def draw_densities(
     axis.set_ylabel(shown.density_axis)
 
 
-def finite_ends(
-    curves: xr.Dataset, response: int
-) -> tuple[dict[str, FloatArray], npt.NDArray[np.bool_]]:
-    """Limits with their ends (curve, level), and which of them hold only given levitation.
+def draw_limits(axis: Axes, x: FloatArray, at: xr.Dataset, look: dict[str, object]) -> None:
+    """Draw limits against something with their intervals.
 
-    Where losses alone are likelier than the failure probability there is no limit; the limit given
-    that levitation holds stands in its place.
-    """
-    at = curves.isel(response=response)
-    scale = labels.SHOWN[response].scale
-    instead = ~np.isfinite(at["curve_limit_high"].to_numpy()) & ~np.isnan(
-        at["curve_limit"].to_numpy()
-    )
-    ends = {
-        end: scale * np.where(instead, at[f"curve_held_limit{end}"], at[f"curve_limit{end}"])
-        for end in _ENDS
-    }
-    return ends, instead
-
-
-def draw_limits(
-    axis: Axes,
-    x: FloatArray,
-    ends: dict[str, FloatArray],
-    instead: npt.NDArray[np.bool_],
-    look: dict[str, object],
-) -> None:
-    """Draw limits against something with their intervals; hollow where levitation is given.
+    The line and hollow markers are the limits given that levitation holds, filled markers those of
+    all passages: there are none where losses alone are likelier than the failure probability.  An
+    arrow stands for an interval without an upper end.
 
     Parameters
     ----------
     axis
         Where to draw.
-    x, ends, instead : (point,)
-        As `finite_ends` returns them, for one line.
+    x : (point,)
+        Places.
+    at
+        ``curve_limit`` and ``curve_held_limit`` with their ends, on one dimension (point,), in
+        the unit of the axis.
     look
         Line style with ``color`` and ``marker``.
     """
-    middle, low, high = (ends[end] for end in _ENDS)
-    kept = np.isfinite(middle)
-    axis.plot(x[kept], middle[kept], **{**look, "marker": ""})
-    reach = np.abs(np.stack([middle - low, high - middle]))
-    for hollow in (False, True):
-        chosen = kept & (instead == hollow)
-        if chosen.any():
-            axis.errorbar(
-                x[chosen],
-                middle[chosen],
-                yerr=np.where(np.isfinite(reach), reach, 0.0)[:, chosen],
-                ls="",
-                marker=look["marker"],
-                ms=3.5,
-                color=look["color"],
-                mfc="white" if hollow else look["color"],
-                capsize=1.5,
-                elinewidth=0.7,
-                capthick=0.7,
-                lw=0.7,
+    for name, hollow in (("held_limit", True), ("limit", False)):
+        middle, low, high = (at[f"curve_{name}{end}"].to_numpy() for end in _ENDS)
+        kept = np.isfinite(middle)
+        if hollow:
+            axis.plot(x[kept], middle[kept], **{**look, "marker": ""})
+        if not kept.any():
+            continue
+        reach = np.abs(np.stack([middle[kept] - low[kept], high[kept] - middle[kept]]))
+        axis.errorbar(
+            x[kept],
+            middle[kept],
+            yerr=np.where(np.isfinite(reach), reach, 0.0),
+            ls="",
+            marker=look["marker"],
+            ms=3.5,
+            color=look["color"],
+            mfc="white" if hollow else look["color"],
+            capsize=1.5,
+            elinewidth=0.7,
+            capthick=0.7,
+            lw=0.7,
+        )
+        for k in np.flatnonzero(kept & np.isinf(high)):
+            arrow = {"arrowstyle": "<-", "color": look["color"], "lw": 0.7, "shrinkA": 0}
+            axis.annotate(
+                "",
+                xy=(x[k], middle[k]),
+                xytext=(0, 13),
+                textcoords="offset points",
+                arrowprops=arrow,
             )
+
+
+def in_shown_unit(found: xr.Dataset, response: int) -> xr.Dataset:
+    """Limits of a response in the unit in which it is shown."""
+    names = [f"curve_{name}{end}" for name in ("limit", "held_limit") for end in _ENDS]
+    return labels.SHOWN[response].scale * found[names].isel(response=response)
+
+
+def differ(found: xr.Dataset) -> bool:
+    """Whether any limit differs from that given that levitation holds."""
+    pair = (found[f"curve_{name}limit"].to_numpy() for name in ("", "held_"))
+    return not np.array_equal(*pair, equal_nan=True)

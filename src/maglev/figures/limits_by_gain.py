@@ -42,14 +42,11 @@ def figure(
         words.append(f"{name}, {int(found['curve_n_runs'][number])} runs, lost {lost}")
         handles.append(Line2D([], [], **looks[-1], ms=3.5))
     fig, axes = style.panels(2, 3, style.PAGE, 4.7)
-    any_instead = False
     for response, axis in enumerate(axes):
-        ends, instead = curves.finite_ends(found, response)
-        any_instead |= bool(instead.any())
+        at = curves.in_shown_unit(found, response)
         for number, look in enumerate(looks):
             apart = 1.06 ** (number - 0.5 * (len(looks) - 1))
-            own = {end: values[number] for end, values in ends.items()}
-            curves.draw_limits(axis, levels * apart, own, instead[number], look)
+            curves.draw_limits(axis, levels * apart, at.isel(curve=number), look)
         axis.set_xscale("log")
         axis.set_xlim(1.7 * levels.max(), levels.min() / 1.7)
         axis.set_xticks(levels, [f"{level:g}" for level in levels], minor=False)
@@ -57,9 +54,9 @@ def figure(
         axis.set_ylabel(f"limit, {labels.SHOWN[response].axis}")
         axis.set_xlabel("failure probability [-]")
         style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
-    if any_instead:
+    if curves.differ(found):
         handles.append(Line2D([], [], ls="", marker="o", ms=3.5, mfc="white", color=style.QUIET))
-        words.append("hollow: given that levitation holds (losses are likelier)")
+        words.append("filled: of all passages; hollow, line: given that levitation holds")
     variation, n_spans = labels.settings(designs[0])
     intervals = f"intervals: {labels.confidence(limits[0])}"
     title = f"random ({n_spans} spans, coefficient of variation {variation:.2f}); {intervals}"

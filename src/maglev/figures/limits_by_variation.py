@@ -44,15 +44,13 @@ def figure(
     levels = found["failure_probability"].to_numpy()
     step = np.diff(variation).min() if variation.size > 1 else 0.02
     fig, axes = style.panels(2, 3, style.PAGE, 4.7)
-    any_instead = False
     for response, axis in enumerate(axes):
-        ends, instead = curves.finite_ends(found, response)
-        any_instead |= bool(instead.any())
+        at = curves.in_shown_unit(found, response)
         for number in range(levels.size):
             look = _LOOKS[number % len(_LOOKS)]
-            own = {end: values[:, number] for end, values in ends.items()}
             apart = 0.07 * step * (number - 0.5 * (levels.size - 1))
-            curves.draw_limits(axis, variation + apart, own, instead[:, number], look)
+            chosen = at.isel(failure_probability=number)
+            curves.draw_limits(axis, variation + apart, chosen, look)
         axis.set_xlim(variation.min() - 0.6 * step, variation.max() + 0.6 * step)
         axis.set_xticks(variation, [f"{one:.2f}" for one in variation])
         axis.set_xlabel("coefficient of variation [-]")
@@ -63,9 +61,9 @@ def figure(
         for k in range(levels.size)
     ]
     words = [f"failure probability {level:g}" for level in levels]
-    if any_instead:
+    if curves.differ(found):
         handles.append(Line2D([], [], ls="", marker="o", ms=3.5, mfc="white", color=style.QUIET))
-        words.append("hollow: given that levitation holds")
+        words.append("hollow, line: given that levitation holds")
     lost = ", ".join(
         f"{labels.percent(float(share))} at {at:.2f}"
         for share, at in zip(found["curve_lost_probability"], variation, strict=True)

@@ -117,8 +117,9 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
             rmse[row, step] = np.sqrt(np.mean((predicted - truth)[~away] ** 2, axis=0))
             share[row, step] = 1.0 - held.mean()
             following = designs[name].isel(sample=slice(n, n + config.study.asm.batch_size))
+            complete = following.sizes["sample"] == config.study.asm.batch_size
             following = following.isel(sample=~lost(following))
-            if following.sizes["sample"]:
+            if complete and following.sizes["sample"]:
                 ahead = found.surrogate.predict(following["standard"].to_numpy())
                 error[row, step] = np.abs(ahead - extremes(following)).max(axis=0) / sigma
             if not held.any():
