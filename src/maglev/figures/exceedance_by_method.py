@@ -68,6 +68,7 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         inside = value[(held < 0.999 * held.max()) & (held > 1.5 / n)]
         margin = 0.05 * np.ptp(inside)
         axis.set_xlim(shown.scale * (inside.min() - margin), shown.scale * (inside.max() + margin))
+        axis.locator_params(axis="x", nbins=5)
         axis.set_xlabel(shown.axis)
         if response % 3 == 0:
             axis.set_ylabel("probability of exceedance [-]")

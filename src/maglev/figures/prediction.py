@@ -26,7 +26,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     """
     methods = [METHODS[code] for code in data["method"].to_numpy()]
     held = data["status"].to_numpy() == 0
-    fig = Figure(figsize=(style.PAGE, 1.15 + 1.0 * len(methods)), layout="constrained")
+    fig = Figure(figsize=(style.PAGE, 1.6 + 0.93 * len(methods)), layout="constrained")
     axes = fig.subplots(len(methods), len(labels.SHOWN), squeeze=False, sharex="col", sharey="col")
     drawn = None
     for row in range(len(methods)):
@@ -57,12 +57,16 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
             if row == 0:
                 axis.set_title(f"{shown.name.replace(' ', chr(10), 1)}", fontsize=7)
             if row == len(methods) - 1:
-                axis.set_xlabel(f"[{shown.unit}]", fontsize=7)
+                axis.set_xlabel(f"computed [{shown.unit}]", fontsize=7)
     for row, method in enumerate(methods):
         n_runs = int(data["method_n_runs"][row])
-        axes[row, 0].set_ylabel(f"{labels.METHOD[method]}\n{n_runs} runs", fontsize=7)
-    fig.supxlabel("computed extreme; in the corners RMSE over the standard deviation", fontsize=8)
-    fig.supylabel("predicted extreme, same unit", fontsize=8)
+        axes[row, 0].set_ylabel(f"{labels.METHOD[method]}\n{n_runs} runs\npredicted", fontsize=7)
+    fig.suptitle(
+        "predicted against computed extremes; in the corners RMSE over the standard deviation",
+        fontsize=8,
+    )
     assert drawn is not None
-    fig.colorbar(drawn, ax=axes, shrink=0.6, pad=0.01, label="runs")
+    fig.colorbar(
+        drawn, ax=axes, location="bottom", shrink=0.4, aspect=40, pad=0.02, label="runs in a cell"
+    )
     return fig, data

@@ -38,9 +38,11 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
     static = float(stability["static_limit"])
 
     fig, (chart, count) = style.panels(1, 2, style.PAGE, 3.1)
-    unstable = np.ma.masked_less_equal(growth, 0.0)
-    filled = chart.contourf(x, y, unstable, levels=8, cmap="Oranges", alpha=0.55)
-    fig.colorbar(filled, ax=chart, label="growth rate [1/s]", shrink=0.9)
+    left = _around(np.append(k_p, static), x)[0] - (x[1] - x[0])
+    fastest = max(float(growth[:, x >= left].max()), 1e-3)
+    levels = np.linspace(0.0, fastest, 9)
+    filled = chart.contourf(x, y, growth, levels=levels, cmap="Oranges", alpha=0.8)
+    fig.colorbar(filled, ax=chart, label="growth rate [1/s]", shrink=0.9, format="%.2g")
     size = 1.2 if status.size > 2000 else 2.5
     held = status == 0
     look = {"ms": size, "mew": 0, "color": "#0072B2", "alpha": 0.5, "rasterized": True}
