@@ -50,7 +50,8 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
                 rasterized=True,
             )
             axis.set(xlim=ends, ylim=ends, box_aspect=1)
-            axis.locator_params(nbins=3)
+            axis.locator_params(axis="x", nbins=2)
+            axis.locator_params(axis="y", nbins=3)
             axis.tick_params(labelsize=6)
             error = float(data["prediction_rmse"][row, response])
             style.note(axis, f"{error:.2f} σ", top=False)

@@ -51,7 +51,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     for row, column in np.ndindex(size, size):
         axis = axes[row, column]
         axis.tick_params(labelsize=6)
-        axis.locator_params(nbins=3)
+        axis.locator_params(nbins=2)
         if column > row:
             axis.axis("off")
             continue
