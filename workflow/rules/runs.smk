@@ -105,7 +105,7 @@ rule design:
     message:
         "Make the design '{wildcards.method}' of '{wildcards.case}'"
     shell:
-        "maglev design --config {input.config} --case {wildcards.case} "
+        "NUMBA_NUM_THREADS={threads} maglev design --config {input.config} --case {wildcards.case} "
         "--method {wildcards.method} --initial {input.initial} {params.options} "
         "--store {params.store} --threads {threads} --out {output} 2> {log}"
 
