@@ -95,7 +95,7 @@ rule density_mcm:
     message:
         "Take the densities of the baseline of '{wildcards.case}'"
     shell:
-        "maglev density --config {input.config} --case {wildcards.case} --method mcm "
+        "NUMBA_NUM_THREADS={threads} maglev density --config {input.config} --case {wildcards.case} --method mcm "
         "--runs {input.runs} --out {output} 2> {log}"
 
 
@@ -141,7 +141,7 @@ rule limits_mcm:
     message:
         "Read the limits of '{wildcards.case}' off its baseline"
     shell:
-        "maglev limits --config {input.config} --case {wildcards.case} --method mcm "
+        "NUMBA_NUM_THREADS={threads} maglev limits --config {input.config} --case {wildcards.case} --method mcm "
         "--runs {input.runs} --out {output} 2> {log}"
 
 
@@ -241,7 +241,7 @@ rule track_split:
     message:
         "Split gains from track in '{wildcards.case}'"
     shell:
-        "maglev track-split --config {input.config} --case {wildcards.case} "
+        "NUMBA_NUM_THREADS={threads} maglev track-split --config {input.config} --case {wildcards.case} "
         "--baseline {input.baseline} {params.parts} --out {output} 2> {log}"
 
 
@@ -332,7 +332,7 @@ rule statistics:
     message:
         "Check that the statistics mean something"
     shell:
-        "maglev statistics-check --config {input.config} {params.baselines} "
+        "NUMBA_NUM_THREADS={threads} maglev statistics-check --config {input.config} {params.baselines} "
         "{params.limits} --out {output} 2> {log}"
 
 
