@@ -74,7 +74,7 @@ def settled(error: np.ndarray, n_runs: np.ndarray, within: float) -> float:
 def draw(n_runs: np.ndarray, error: np.ndarray, noise: np.ndarray, levels: np.ndarray) -> None:
     """Figure: largest error of the six limits against the number of runs, one line a seed."""
     with style.page():
-        figure, axes = style.panels(1, levels.size, 170, 62)
+        figure, axes = style.panels(1, levels.size, style.PAGE, 2.6)
         for axis, level, of_level, reach in zip(
             axes, levels, np.moveaxis(error, -1, 0), noise.max(axis=0), strict=True
         ):
