@@ -53,12 +53,13 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
             axis.locator_params(axis="x", nbins=2)
             axis.locator_params(axis="y", nbins=3)
             axis.tick_params(labelsize=6)
+            axis.tick_params(axis="x", labelrotation=45)
             error = float(data["prediction_rmse"][row, response])
             style.note(axis, f"{error:.2f} σ", top=False)
             if row == 0:
-                axis.set_title(f"{shown.name.replace(' ', chr(10), 1)}", fontsize=7)
+                axis.set_title(f"{shown.name.replace(' ', chr(10), 1)}", fontsize=6)
             if row == len(methods) - 1:
-                axis.set_xlabel(f"computed [{shown.unit}]", fontsize=7)
+                axis.set_xlabel(f"computed [{shown.unit}]", fontsize=6)
     for row, method in enumerate(methods):
         n_runs = int(data["method_n_runs"][row])
         axes[row, 0].set_ylabel(f"{labels.METHOD[method]}\n{n_runs} runs\npredicted", fontsize=7)
