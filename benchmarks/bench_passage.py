@@ -34,15 +34,17 @@ from maglev.figures import style
 from maglev.fingerprint import code_of
 from maglev.mechanics import integrate, reference
 from maglev.mechanics._kernels import (
-    _gather,
+    Line,
+    _advance_line,
+    _advance_train,
     _line_acceleration,
     _links,
+    _load_line,
     _magnets,
-    _project,
-    _transform,
+    _move_rails,
 )
 from maglev.mechanics.course import n_steps, time_step
-from maglev.mechanics.lanes import LANES, load, store
+from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
 from maglev.simulation import _system, track
 from maglev.stages import config_slice
@@ -235,12 +237,25 @@ def poles_on_guideway(system: integrate.System) -> tuple[int, float]:
     return poles, met / n_steps(system.config)
 
 
+def steps_of_stages(system: integrate.System) -> Array:
+    """Steps that each stage of the guideway lasts (stage,) [-]."""
+    ends = [*system.line.stage_step[1:], n_steps(system.config) + 1]
+    return np.array(ends) - system.line.stage_step
+
+
+def span_of_stage(line: Line, stage: int) -> tuple[int, int, int]:
+    """Where in ``line.stepped`` a stage begins, where its pier tops begin, and where it ends."""
+    return line.stage_start[stage], line.stage_tops[stage], line.stage_start[stage + 1]
+
+
 def operations(system: integrate.System) -> dict[str, float]:
     """Operations of a mean step of one sample in each phase, from the sizes of its arrays."""
     vehicle, line = system.vehicle, system.line
-    n_dof, n_line, n_modes = vehicle.inverse_mass.size, line.row_start.size - 1, line.n_modes
-    # links: stretch and rate 2(2m - 1) for m coefficients, pull 3, forces back 2m
-    links = 6 * vehicle.link_coefficient.size + vehicle.link_stiffness.size
+    steps = steps_of_stages(system)
+    n_dof = vehicle.inverse_mass.size
+    # links: what they hang on 3, fused; stretch 2m - 1 and force back 2m for m coefficients
+    links = 3 * vehicle.scaled_dof.size + 4 * vehicle.link_coefficient.size
+    links -= vehicle.link_start.size - 1
     # poles: gap error 3, its rate 3, gap 1, current 4, pull 3, force and moment 3, means 2;
     # a magnet: signs 4, force and moment on the train 6, means 2
     n_poles, n_on = poles_on_guideway(system)
@@ -251,70 +266,74 @@ def operations(system: integrate.System) -> dict[str, float]:
     # rails of a span: displacement and velocity of z, roll and y from the coordinates that move
     # them, right and left from mean and roll; back: forces on those coordinates
     rails = 0.0
-    shares = rail_under_train(system)
-    moving = float((noses(system) >= 0).mean())  # until then the guideway rests
-    for span, share in enumerate(shares):
+    for span, share in enumerate(rail_under_train(system)):
         moved = np.diff(line.upright_start)[span] + 2 * np.diff(line.sideways_start)[span]
         rails += share * line.stride * (2 * (2 * moved + 2) + 2 + 2 * moved)
-    # guideway: relative rates and their forces back, stiffness, damping, exact step, pier tops
-    band, n_top = line.top_factor.shape[1], n_line - n_modes
-    guideway = 2 * (2 * line.carried.size + line.stiffness.size + line.damping.size) + 2 * n_line
-    guideway += 2 * sum(1 + 2 * min(band - 1, i) for i in range(n_top))
+    # guideway, of what is stepped: relative motion and its rate, forces back, stiffness, damping,
+    # exact step, pier tops
+    guideway, line_states = 0.0, 0.0
+    for stage, share in enumerate(steps / n_steps(system.config)):
+        start, tops, stop = span_of_stage(line, stage)
+        modes = line.stepped[start:tops]
+        carried = np.diff(line.carried_start)[modes].sum()
+        each = slice(start, stop)
+        taken = (line.taken_to[each] - line.taken_from[each])[tops - start :].sum()
+        damping = (line.damping_to[each] - line.damping_from[each]).sum()
+        between = np.diff(line.stiffness_start)[line.stepped[tops:stop] - line.square.size].sum()
+        factor = line.factor_start[stop] - line.factor_start[tops]
+        coefficients = 2 * carried + taken + modes.size + between + damping + 2 * factor
+        guideway += share * (2 * coefficients + (stop - start) + modes.size + 2 * (stop - tops))
+        line_states += share * 10 * (stop - start)
     # states: x 4, predicted 2, half kicks 2 and 2, fused; the train's forces over its masses 1
-    states = 12 * n_dof + 11 * n_line * moving
-    # outputs: midspan z and y 4 a column, each section of the low-pass 9, size of a response 1
+    states = 11 * n_dof + line_states
+    # outputs: midspan z and y 4 a column, each section of the low-pass 9, peak of a response 9
     n_sections = integrate._run(system.config, 0).sections.shape[0]
-    outputs = 2 * (4 * line.output_column.size + 9 * n_sections) + 4 + 2 * vehicle.body_z.size
+    outputs = 2 * (4 * line.output_column.size + 9 * n_sections)
+    outputs += 9 * (4 + 2 * vehicle.body_z.size)
     return {
         "train links": links,
         "poles: gap, current, force": poles,
         "poles: rail under them and force back": under_poles,
         "rails: from modes and back": rails,
-        "guideway: stiffness, damping, pier tops": guideway * moving,
+        "guideway: stiffness, damping, pier tops": guideway,
         "states: predict and kick": states,
         "outputs": outputs,
     }
 
 
 @njit
-def _repeat_links(n, vehicle, x, velocity, force):
+def _repeat_links(n, vehicle, x, velocity, scaled, pull, force):
     for _ in range(n):
-        _links(vehicle, x, velocity, force)
+        _links(vehicle, x, velocity, scaled, pull, force)
 
 
 @njit
-def _repeat_line(n, line, x, velocity, relative, force):
+def _repeat_train(n, vehicle, dt, x, velocity, predicted, force):
     for _ in range(n):
-        _line_acceleration(line, x, velocity, relative, force)
+        _advance_train(vehicle, 0.5 * dt, dt, 0.5 * dt * dt, x, velocity, predicted, force)
 
 
 @njit
-def _repeat_rails(n, line, span, x, velocity, motion, motion_velocity, pull, roll, packed, force):
+def _repeat_line(n, line, stage, relative, rate, force):
+    for _ in range(n):
+        _line_acceleration(line, stage, relative, rate, force)
+
+
+@njit
+def _repeat_advance(n, line, stage, dt, x, velocity, acceleration, relative, rate):
+    for _ in range(n):
+        _advance_line(
+            line, stage, 0.5 * dt, dt, 0.5 * dt * dt, x, velocity, acceleration, relative, rate
+        )
+
+
+@njit
+def _repeat_rails(n, line, span, x, velocity, motion, rate, pull, turn, packed, force):
     """What the passage does with the rails of one span in a step, there and back."""
-    at = span * line.stride
-    up, up_end = line.upright_start[span], line.upright_start[span + 1]
-    out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
     for _ in range(n):
-        for quantity in range(2):
-            source = x if quantity == 0 else velocity
-            target = motion if quantity == 0 else motion_velocity
-            _gather(source, line.upright, up, up_end, packed)
-            _transform(line.rail_z, up, up_end, packed, 0, line.stride, target[0], at)
-            _gather(source, line.sideways, out, out_end, packed)
-            _transform(line.rail_roll, out, out_end, packed, 0, line.stride, roll, 0)
-            _transform(line.rail_y, out, out_end, packed, 0, line.stride, target[2], at)
-            for k in range(line.stride):
-                mean, turn = load(target[0], at + k), load(roll, k)
-                store(target[0], at + k, mean + turn)
-                store(target[1], at + k, mean - turn)
-        for k in range(line.stride):
-            right, left = load(pull[0], at + k), load(pull[1], at + k)
-            store(pull[0], at + k, right + left)
-            store(roll, k, right - left)
-        end = line.stride
-        _project(line.rail_z, line.upright, up, up_end, 0, end, pull[0], at, force)
-        _project(line.rail_roll, line.sideways, out, out_end, 0, end, roll, 0, force)
-        _project(line.rail_y, line.sideways, out, out_end, 0, end, pull[2], at, force)
+        _move_rails(line, span, 0, line.stride, x, packed, motion)
+        _move_rails(line, span, 0, line.stride, velocity, packed, rate)
+        _load_line(line, span, 0, line.stride, pull, turn, force)
 
 
 @njit
@@ -334,13 +353,17 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     """
     counted = operations(system)
     line, rng = system.line, np.random.default_rng(3)
-    n_dof, n_line = system.vehicle.inverse_mass.size, line.row_start.size - 1
-    x, v = 1e-5 * rng.standard_normal((2, n_dof, LANES))
+    vehicle, dt = system.vehicle, time_step(system.config)
+    n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
+    x, v, predicted = 1e-5 * rng.standard_normal((3, n_dof, LANES))
     line_x, line_v = 1e-5 * rng.standard_normal((2, n_line, LANES))
-    force, line_force, relative = np.zeros((n_dof, LANES)), *np.zeros((2, n_line, LANES))
+    force, at_rest = np.zeros((2, n_dof, LANES))
+    line_force, relative, its_rate = np.zeros((3, n_line, LANES))
+    scaled = np.zeros((vehicle.scaled_dof.size, LANES))
+    link_pull = np.zeros((vehicle.link_start.size - 1, LANES))
     motion, rate, pull = 1e-5 * rng.standard_normal((3, 3, line.n_spans * line.stride, LANES))
-    roll = np.zeros((line.stride, LANES))
-    packed = np.zeros((max(line.upright.size, line.sideways.size), LANES))
+    turn = np.zeros((line.stride, LANES))
+    packed = np.zeros((line.upright.size + line.sideways.size, LANES))
     magnet = np.zeros((4, system.train.magnets.x.size, LANES))
     run = integrate._run(system.config, 0)
     outcome = integrate._empty_outcome(system, run)
@@ -350,16 +373,30 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
         function(1)  # compiles
         return timed(lambda: function(n), 3).process / n / LANES
 
-    links = per_call(2000, lambda n: _repeat_links(n, system.vehicle, x, v, force))
-    guideway = per_call(1000, lambda n: _repeat_line(n, line, line_x, line_v, relative, line_force))
-    guideway *= float((noses(system) >= 0).mean())
+    links = per_call(
+        2000, lambda n: _repeat_links(n, vehicle, x, v, scaled, link_pull, force)
+    )
+    states = per_call(
+        2000, lambda n: _repeat_train(n, vehicle, dt, x, v * 0, predicted, at_rest)
+    )
+    guideway = 0.0
+    for stage, share in enumerate(steps_of_stages(system) / n_steps(system.config)):
+        guideway += share * per_call(
+            500, lambda n, at=stage: _repeat_line(n, line, at, line_x, line_v, line_force)
+        )
+        states += share * per_call(
+            500,
+            lambda n, at=stage: _repeat_advance(
+                n, line, at, dt, line_x * 0, line_v * 0, line_force * 0, relative, its_rate
+            ),
+        )
     shares = rail_under_train(system)
     rails = sum(
         share
         * per_call(
             1000,
             lambda n, span=span: _repeat_rails(
-                n, line, span, line_x, line_v, motion, rate, pull, roll, packed, line_force
+                n, line, span, line_x, line_v, motion, rate, pull, turn, packed, line_force
             ),
         )
         for span, share in enumerate(shares)
@@ -378,8 +415,8 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
             )  # fmt: skip
 
         poles += per_call(-(-run.n_steps // every), calls)
-    rest = per_step - links - guideway - rails - poles
-    law, under, states = (
+    rest = per_step - links - guideway - rails - poles - states
+    law, under, counted_states = (
         counted.pop(name)
         for name in (
             "poles: gap, current, force",
@@ -398,17 +435,17 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
             counted["guideway: stiffness, damping, pier tops"],
             guideway,
         ),
-        Phase("states: predict and kick", states),
-        Phase("outputs", counted["outputs"]),
-        Phase("states, outputs and the rest", states + counted["outputs"], rest),
+        Phase("states: predict and kick", counted_states, states),
+        Phase("outputs and the rest", counted["outputs"], rest),
     ]
 
 
 def step_bytes(system: integrate.System) -> tuple[int, int]:
     """Bytes that a row of samples goes through in a step: states, and matrices they share."""
     line, vehicle = system.line, system.vehicle
-    n_dof, n_line = vehicle.inverse_mass.size, line.row_start.size - 1
-    rows = 4 * n_dof + 5 * n_line + 9 * line.n_spans * line.stride
+    n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
+    rows = 4 * n_dof + vehicle.scaled_dof.size + vehicle.link_start.size - 1
+    rows += 5 * n_line + 9 * line.n_spans * line.stride
     shared = [*line, *vehicle]
     tables = sum(array.nbytes for array in shared if isinstance(array, np.ndarray))
     return rows * LANES * 8, tables

@@ -12,21 +12,41 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from maglev.mechanics.lanes import LANES, choose, fma, load, maximum, minimum, store
+from maglev.mechanics.lanes import (
+    LANES,
+    WIDE,
+    choose,
+    entry,
+    fma,
+    load,
+    maximum,
+    minimum,
+    store,
+    zeros,
+)
 
 COMPLETED, CONTACT, GAP_LOST, NOT_FINITE = 0, 1, 2, 3
 """How a passage ended: the values of ``status`` [-]."""
 
 
 class Vehicle(NamedTuple):
-    """Train with open magnets; links in rows of non-zero coefficients."""
+    """Train with open magnets; links in rows and columns of non-zero coefficients.
+
+    Springs and dampers of a kind pull by ``stiffness * x + damping * velocity`` of what they hang
+    on; each degree of freedom is scaled so once for every kind of link that it meets.
+    """
 
     inverse_mass: np.ndarray  # (dof,)
-    link_start: np.ndarray  # (link + 1,)
-    link_dof: np.ndarray  # (non-zero,)
+    scaled_dof: np.ndarray  # (scaled,) degree of freedom
+    scaled_stiffness: np.ndarray  # (scaled,)
+    scaled_damping: np.ndarray  # (scaled,)
+    link_start: np.ndarray  # (link + 1,) what pulls in a link
+    link_scaled: np.ndarray  # (non-zero,)
     link_coefficient: np.ndarray  # (non-zero,)
-    link_stiffness: np.ndarray  # (link,)
-    link_damping: np.ndarray  # (link,)
+    pulled: np.ndarray  # (dof,) degrees of freedom in the order of the next rows
+    pull_start: np.ndarray  # (dof + 1,) the links that pull at each
+    pull_link: np.ndarray  # (non-zero,)
+    pull_coefficient: np.ndarray  # (non-zero,)
     body_z: np.ndarray  # (car,) degree of freedom
     body_y: np.ndarray  # (car,)
 
@@ -51,7 +71,12 @@ class MagnetRows(NamedTuple):
 
 
 class Line(NamedTuple):
-    """Guideway in component coordinates: modes of spans, modes of piers, pier tops."""
+    """Guideway in component coordinates: modes of spans, modes of piers, pier tops.
+
+    A mode's relative motion is its own less what the pier tops take along of it.  Rails, springs
+    and dampers know relative motions only.  While the train is where it is, only some coordinates
+    are stepped: those of a stage.  The other modes have no relative motion, the other tops stand.
+    """
 
     n_spans: int
     span_length: float
@@ -61,21 +86,37 @@ class Line(NamedTuple):
     upright: np.ndarray  # coordinates that move a span's rails up and down
     sideways_start: np.ndarray  # (span + 1,)
     sideways: np.ndarray  # coordinates that roll a span or move it sideways
-    rail_z: np.ndarray  # (upright, stride)
+    rail_z: np.ndarray  # (upright, stride) per relative motion, as the next two
     rail_roll: np.ndarray  # (sideways, stride)
     rail_y: np.ndarray  # (sideways, stride)
-    n_modes: int
-    row_start: np.ndarray  # (coordinate + 1,) stiffness
-    column: np.ndarray
-    stiffness: np.ndarray
+    square: np.ndarray  # (mode,) squared circular frequency [1/s^2]
+    response: np.ndarray  # (mode,) makes the step exact for a mode on its own [-]
     carried_start: np.ndarray  # (mode + 1,) what modes take along of the pier tops' motion
-    carried_column: np.ndarray
+    carried_top: np.ndarray  # coordinate
     carried: np.ndarray
-    damping_start: np.ndarray  # (coordinate + 1,) on relative rates
-    damping_column: np.ndarray
+    damping_column: np.ndarray  # coordinate, in rows that the stages name
     damping: np.ndarray
-    response: np.ndarray  # (coordinate,) makes the step exact for a mode on its own [-]
-    top_factor: np.ndarray  # (top, band) Cholesky rows of the pier tops' mass, diagonal inverted
+    taken_mode: np.ndarray  # the same as carried by pier tops, in rows that the stages name
+    taken: np.ndarray
+    stiffness_start: np.ndarray  # (top + 1,) between pier tops
+    stiffness_top: np.ndarray  # coordinate
+    stiffness: np.ndarray
+    stage_step: np.ndarray  # (stage,) first step; before the first of all the guideway rests
+    stage_start: np.ndarray  # (stage + 1,) into ``stepped``
+    stage_tops: np.ndarray  # (stage,) where pier tops follow modes
+    stepped: np.ndarray  # coordinates that are stepped
+    damping_from: np.ndarray  # of each of them, its row of ``damping``
+    damping_to: np.ndarray
+    taken_from: np.ndarray  # and of ``taken``
+    taken_to: np.ndarray
+    factor_start: np.ndarray  # (stepped + 1,) Cholesky rows of the mass of stepped pier tops
+    factor_top: np.ndarray  # coordinate
+    factor: np.ndarray
+    factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal
+    woken_start: np.ndarray  # (stage + 1,) modes that had no relative motion before
+    woken: np.ndarray
+    stilled_start: np.ndarray  # (stage + 1,) coordinates that were stepped before
+    stilled: np.ndarray
     output_column: np.ndarray  # (output column,) coordinates that move midspan
     midspan: np.ndarray  # (2, output column) z and y
     midspan_acceleration: np.ndarray  # (2, output column) the same per stepped acceleration
@@ -97,6 +138,7 @@ class Places(NamedTuple):
 class Run(NamedTuple):
     """One passage and how it is watched."""
 
+    first_step: int  # until then the train rests
     n_steps: int
     time_step: float
     speed: float
@@ -123,46 +165,183 @@ class Outcome(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _gather(source, columns, start, stop, packed):
-    """``packed[m] = source[columns[start + m]]``: the product reads rows that follow each other."""
-    for m in range(start, stop):
-        store(packed, m - start, load(source, columns[m]))
+def _advance_train(vehicle, half, dt, half_square, x, velocity, predicted, force):
+    """Close the last step of the train and open the next; velocities are those half-way."""
+    for i in range(vehicle.inverse_mass.size):
+        a = load(force, i) * entry(vehicle.inverse_mass, i)
+        v = fma(a, half, load(velocity, i))
+        store(x, i, fma(a, half_square, fma(v, dt, load(x, i))))
+        store(predicted, i, fma(a, dt, v))
+        store(velocity, i, fma(a, half, v))
 
 
 @njit(cache=True, error_model="numpy")
-def _transform(matrix, start, stop, packed, left, right, target, first):
-    """``target[first + k] = Σ_m matrix[start + m, k] packed[m]`` for ``left`` ≤ k < ``right``.
+def _sum(coefficients, places, start, stop, source, total):
+    """``total + Σ_k coefficients[k] source[places[k]]`` for ``start`` ≤ k < ``stop``."""
+    for k in range(start, stop):
+        total = fma(load(source, entry(places, k)), entry(coefficients, k), total)
+    return total
 
-    Two rows at once fill the registers.
+
+@njit(cache=True, error_model="numpy")
+def _links(vehicle, x, velocity, scaled, pull, force):
+    """Put the forces of springs and dampers on the train."""
+    for k in range(vehicle.scaled_dof.size):
+        i = entry(vehicle.scaled_dof, k)
+        along = load(x, i) * entry(vehicle.scaled_stiffness, k)
+        store(scaled, k, fma(load(velocity, i), entry(vehicle.scaled_damping, k), along))
+    coefficient, start = vehicle.link_coefficient, vehicle.link_start
+    none = load(x, 0) * 0.0
+    for i in range(start.size - 1):
+        first, last = entry(start, i), entry(start, i + 1)
+        store(pull, i, _sum(coefficient, vehicle.link_scaled, first, last, scaled, none))
+    coefficient, start = vehicle.pull_coefficient, vehicle.pull_start
+    for i in range(start.size - 1):
+        first, last = entry(start, i), entry(start, i + 1)
+        total = _sum(coefficient, vehicle.pull_link, first, last, pull, none)
+        store(force, entry(vehicle.pulled, i), none - total)
+
+
+@njit(cache=True, error_model="numpy")
+def _gather(source, columns, start, stop, packed, first):
+    """``packed[first + m] = source[columns[start + m]]``: products then read rows in a row."""
+    for m in range(start, stop):
+        store(packed, first + m - start, load(source, entry(columns, m)))
+
+
+@njit(cache=True, error_model="numpy")
+def _transform(matrix, start, stop, packed, at, left, right, target, first):
+    """``target[first + k] = Σ_m matrix[start + m, k] packed[at + m]`` for ``left`` ≤ k < ``right``.
+
+    As many rows at once as there are registers; the order of a sum does not depend on it.
     """
-    for k in range(left, right, 2):
-        a = load(packed, 0) * 0.0
-        b = a
-        for m in range(stop - start):
+    none = load(packed, at) * 0.0
+    width = matrix.shape[1]
+    k = left
+    while WIDE and k + 4 <= right:
+        a, b, c, d = none, none, none, none
+        place = start * width + k
+        for m in range(at, at + stop - start):
             one = load(packed, m)
-            a = fma(one, matrix[start + m, k], a)
-            b = fma(one, matrix[start + m, k + 1], b)
+            a = fma(one, entry(matrix, place), a)
+            b = fma(one, entry(matrix, place + 1), b)
+            c = fma(one, entry(matrix, place + 2), c)
+            d = fma(one, entry(matrix, place + 3), d)
+            place += width
         store(target, first + k, a)
         store(target, first + k + 1, b)
+        store(target, first + k + 2, c)
+        store(target, first + k + 3, d)
+        k += 4
+    while k < right:
+        a, b = none, none
+        place = start * width + k
+        for m in range(at, at + stop - start):
+            one = load(packed, m)
+            a = fma(one, entry(matrix, place), a)
+            b = fma(one, entry(matrix, place + 1), b)
+            place += width
+        store(target, first + k, a)
+        store(target, first + k + 1, b)
+        k += 2
+
+
+@njit(cache=True, error_model="numpy")
+def _transform_both(
+    mean, up, up_end, turn, out, out_end, packed, left, right, right_rail, left_rail, first
+):
+    """Motion of both rails from that of their mean and the roll, each as by `_transform`.
+
+    ``packed`` holds what moves the mean, then what rolls it.
+    """
+    n = up_end - up
+    none = load(packed, 0) * 0.0
+    width = mean.shape[1]
+    k = left
+    while WIDE and k + 4 <= right:
+        a, b, c, d = none, none, none, none
+        e, f, g, h = none, none, none, none
+        place = up * width + k
+        for m in range(n):
+            one = load(packed, m)
+            a = fma(one, entry(mean, place), a)
+            b = fma(one, entry(mean, place + 1), b)
+            c = fma(one, entry(mean, place + 2), c)
+            d = fma(one, entry(mean, place + 3), d)
+            place += width
+        place = out * width + k
+        for m in range(n, n + out_end - out):
+            one = load(packed, m)
+            e = fma(one, entry(turn, place), e)
+            f = fma(one, entry(turn, place + 1), f)
+            g = fma(one, entry(turn, place + 2), g)
+            h = fma(one, entry(turn, place + 3), h)
+            place += width
+        store(right_rail, first + k, a + e)
+        store(left_rail, first + k, a - e)
+        store(right_rail, first + k + 1, b + f)
+        store(left_rail, first + k + 1, b - f)
+        store(right_rail, first + k + 2, c + g)
+        store(left_rail, first + k + 2, c - g)
+        store(right_rail, first + k + 3, d + h)
+        store(left_rail, first + k + 3, d - h)
+        k += 4
+    while k < right:
+        a, b, e, f = none, none, none, none
+        place = up * width + k
+        for m in range(n):
+            one = load(packed, m)
+            a = fma(one, entry(mean, place), a)
+            b = fma(one, entry(mean, place + 1), b)
+            place += width
+        place = out * width + k
+        for m in range(n, n + out_end - out):
+            one = load(packed, m)
+            e = fma(one, entry(turn, place), e)
+            f = fma(one, entry(turn, place + 1), f)
+            place += width
+        store(right_rail, first + k, a + e)
+        store(left_rail, first + k, a - e)
+        store(right_rail, first + k + 1, b + f)
+        store(left_rail, first + k + 1, b - f)
+        k += 2
 
 
 @njit(cache=True, error_model="numpy")
 def _project(matrix, columns, start, stop, left, right, source, first, target):
     """``target[columns[m]] += Σ_k matrix[m, k] source[first + k]`` for ``left`` ≤ k < ``right``."""
-    for m in range(start, stop - 1, 2):
-        a = load(target, columns[m])
-        b = load(target, columns[m + 1])
+    width = matrix.shape[1]
+    m = start
+    while WIDE and m + 4 <= stop:
+        a, b = load(target, entry(columns, m)), load(target, entry(columns, m + 1))
+        c, d = load(target, entry(columns, m + 2)), load(target, entry(columns, m + 3))
+        place = m * width
         for k in range(left, right):
             one = load(source, first + k)
-            a = fma(one, matrix[m, k], a)
-            b = fma(one, matrix[m + 1, k], b)
-        store(target, columns[m], a)
-        store(target, columns[m + 1], b)
-    if (stop - start) % 2 == 1:
-        a = load(target, columns[stop - 1])
+            a = fma(one, entry(matrix, place + k), a)
+            b = fma(one, entry(matrix, place + width + k), b)
+            c = fma(one, entry(matrix, place + 2 * width + k), c)
+            d = fma(one, entry(matrix, place + 3 * width + k), d)
+        store(target, entry(columns, m), a)
+        store(target, entry(columns, m + 1), b)
+        store(target, entry(columns, m + 2), c)
+        store(target, entry(columns, m + 3), d)
+        m += 4
+    while m + 2 <= stop:
+        a, b = load(target, entry(columns, m)), load(target, entry(columns, m + 1))
+        place = m * width
         for k in range(left, right):
-            a = fma(load(source, first + k), matrix[stop - 1, k], a)
-        store(target, columns[stop - 1], a)
+            one = load(source, first + k)
+            a = fma(one, entry(matrix, place + k), a)
+            b = fma(one, entry(matrix, place + width + k), b)
+        store(target, entry(columns, m), a)
+        store(target, entry(columns, m + 1), b)
+        m += 2
+    if m < stop:
+        a = load(target, entry(columns, m))
+        for k in range(left, right):
+            a = fma(load(source, first + k), entry(matrix, m * width + k), a)
+        store(target, entry(columns, m), a)
 
 
 @njit(cache=True, error_model="numpy")
@@ -185,22 +364,14 @@ def _magnets(
     magnet_current,
 ):
     """Close all magnets of one kind: gaps, currents, forces on train and rails."""
-    base, weight, rise, rail, ramp = (
-        places.base,
-        places.weight,
-        places.rise,
-        places.rail,
-        places.ramp,
-    )
     n_poles = rows.offset.size
-    own_track = rail.shape[2] > 1
+    own_track = places.rail.shape[2] > 1
     kind = 1 if rows.is_guidance else 0
-    proportional = load(gains, 2 * kind)
-    derivative = load(gains, 2 * kind + 1)
     least = load(outcome.gap_min, kind)
     most = load(outcome.gap_max, kind)
     strongest = load(outcome.current_max, kind)
-    at_rest = least * 0.0 + rows.current_reference
+    none = least * 0.0
+    at_rest = none + rows.current_reference
     for row in range(rows.x.size):
         for side in range(2):
             field = 2 if kind == 1 else side
@@ -210,62 +381,56 @@ def _magnets(
                 rail_force[field],
             )
             sign = rows.outward[side]
+            proportional = load(gains, 2 * kind) * sign
+            derivative = load(gains, 2 * kind + 1) * sign
             translation = rows.translation[row, side]
             rotation = rows.rotation[row, side]
-            shift = load(x, translation) * sign
-            turn = load(x, rotation) * sign
-            shift_velocity = load(velocity, translation) * sign
-            turn_velocity = load(velocity, rotation) * sign
-            total = shift * 0.0
-            moment = total
-            smallest = total + 1.0e9
-            largest = total - 1.0e9
-            gap_sum = total
-            current_sum = total
+            shift, turn = load(x, translation), load(x, rotation)
+            shift_velocity, turn_velocity = load(velocity, translation), load(velocity, rotation)
+            total, moment = none, none
+            smallest, largest = none + 1.0e9, none - 1.0e9
+            gap_sum, current_sum = none, none
             for p in range(n_poles):
-                here = places.number[row, p] + step
-                error = fma(turn, rows.arm[p], shift)
-                rate = fma(turn_velocity, rows.arm[p], shift_velocity)
+                here = entry(places.number, row * n_poles + p) + step
+                arm = entry(rows.arm, p)
                 if own_track:
-                    error = fma(load(rail, 2 * here + side), -sign, error)
-                    rate = fma(load(ramp, 2 * here + side), -sign, rate)
+                    rail = load(places.rail, 2 * here + side)
+                    rise = load(places.ramp, 2 * here + side)
                 else:
-                    error = error - sign * rail[here, side, 0]
-                    rate = rate - sign * ramp[here, side, 0]
-                k = base[here]
+                    rail = none + entry(places.rail, 2 * here + side)
+                    rise = none + entry(places.ramp, 2 * here + side)
+                k = entry(places.base, here)
                 if k >= 0:
                     for j in range(4):
+                        weight = entry(places.weight, 4 * here + j)
                         deflection = load(motion, k + j)
-                        error = fma(deflection, -sign * weight[here, j], error)
-                        rate = fma(deflection, -sign * rise[here, j], rate)
-                        rate = fma(load(motion_velocity, k + j), -sign * weight[here, j], rate)
-                gap = error + rows.gap_reference
+                        rail = fma(deflection, weight, rail)
+                        rise = fma(deflection, entry(places.rise, 4 * here + j), rise)
+                        rise = fma(load(motion_velocity, k + j), weight, rise)
+                error = fma(turn, arm, shift) - rail
+                rate = fma(turn_velocity, arm, shift_velocity) - rise
+                gap = fma(error, sign, none + rows.gap_reference)
                 current = fma(proportional, error, fma(derivative, rate, at_rest))
                 current = maximum(minimum(current, rows.current_max), 0.0)
                 ratio = current / gap
-                pull = ratio * ratio * rows.constant[row, side, p]
+                constant = entry(rows.constant, (2 * row + side) * n_poles + p)
+                pull = ratio * ratio * (sign * constant)
                 total = total + pull
-                moment = fma(pull, rows.arm[p], moment)
+                moment = fma(pull, arm, moment)
                 if k >= 0:
                     for j in range(4):
-                        store(
-                            rail_pull,
-                            k + j,
-                            fma(pull, sign * weight[here, j], load(rail_pull, k + j)),
-                        )
+                        weight = entry(places.weight, 4 * here + j)
+                        store(rail_pull, k + j, fma(pull, weight, load(rail_pull, k + j)))
                 smallest = minimum(smallest, gap)
                 largest = maximum(largest, gap)
                 strongest = maximum(strongest, current)
                 if keep:
                     gap_sum = gap_sum + gap
                     current_sum = current_sum + current
-            static_moment = rows.static_moment[row, side]
-            store(
-                force,
-                translation,
-                load(force, translation) - (total - rows.static_force[row, side]) * sign,
-            )
-            store(force, rotation, load(force, rotation) - (moment - static_moment) * sign)
+            static_force = rows.static_force[row, side] * sign
+            static_moment = rows.static_moment[row, side] * sign
+            store(force, translation, load(force, translation) - (total - static_force))
+            store(force, rotation, load(force, rotation) - (moment - static_moment))
             number = rows.number[row, side]
             store(magnet_min, number, smallest)
             store(magnet_max, number, largest)
@@ -280,63 +445,137 @@ def _magnets(
 
 
 @njit(cache=True, error_model="numpy")
-def _links(vehicle, x, velocity, force):
-    """Add the forces of springs and dampers to the train."""
-    for link in range(vehicle.link_stiffness.size):
-        start, stop = vehicle.link_start[link], vehicle.link_start[link + 1]
-        stretch = load(x, vehicle.link_dof[start]) * vehicle.link_coefficient[start]
-        rate = load(velocity, vehicle.link_dof[start]) * vehicle.link_coefficient[start]
-        for k in range(start + 1, stop):
-            stretch = fma(load(x, vehicle.link_dof[k]), vehicle.link_coefficient[k], stretch)
-            rate = fma(load(velocity, vehicle.link_dof[k]), vehicle.link_coefficient[k], rate)
-        pull = stretch * vehicle.link_stiffness[link] + rate * vehicle.link_damping[link]
-        for k in range(start, stop):
-            dof = vehicle.link_dof[k]
-            store(force, dof, load(force, dof) - pull * vehicle.link_coefficient[k])
+def _move_rails(line, span, begin, end, source, packed, motion):
+    """Motion (or its rate) of a span's rails from the relative motion of the coordinates."""
+    at = span * line.stride
+    up, up_end = line.upright_start[span], line.upright_start[span + 1]
+    out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
+    _gather(source, line.upright, up, up_end, packed, 0)
+    _gather(source, line.sideways, out, out_end, packed, up_end - up)
+    _transform_both(
+        line.rail_z, up, up_end, line.rail_roll, out, out_end, packed, begin, end,
+        motion[0], motion[1], at,
+    )  # fmt: skip
+    _transform(line.rail_y, out, out_end, packed, up_end - up, begin, end, motion[2], at)
 
 
 @njit(cache=True, error_model="numpy")
-def _line_acceleration(line, x, velocity, relative, force):
-    """Turn the forces on the guideway's coordinates into accelerations, in place."""
-    n, n_modes = x.shape[0], line.n_modes
-    for i in range(n):
-        rate = load(velocity, i)
+def _load_line(line, span, begin, end, rail_force, turn, force):
+    """Add the forces on a span's rails to the coordinates that move them.
+
+    Leaves the sum of right and left in ``rail_force[0]`` and the difference in ``turn``.
+    """
+    at = span * line.stride
+    up, up_end = line.upright_start[span], line.upright_start[span + 1]
+    out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
+    for k in range(begin, end):
+        right, left = load(rail_force[0], at + k), load(rail_force[1], at + k)
+        store(rail_force[0], at + k, right + left)
+        store(turn, k, right - left)
+    _project(line.rail_z, line.upright, up, up_end, begin, end, rail_force[0], at, force)
+    _project(line.rail_roll, line.sideways, out, out_end, begin, end, turn, 0, force)
+    _project(line.rail_y, line.sideways, out, out_end, begin, end, rail_force[2], at, force)
+
+
+@njit(cache=True, error_model="numpy")
+def _change_stage(line, stage, x, velocity, acceleration, relative, relative_rate):
+    """Let coordinates go that are no longer stepped, and take up those that are again."""
+    n_modes = line.square.size
+    for k in range(line.stilled_start[stage], line.stilled_start[stage + 1]):
+        i = line.stilled[k]
+        store(velocity, i, 0.0)
+        store(acceleration, i, 0.0)
+        store(relative_rate, i, 0.0)
         if i < n_modes:
-            for k in range(line.carried_start[i], line.carried_start[i + 1]):
-                rate = fma(load(velocity, line.carried_column[k]), -line.carried[k], rate)
-        store(relative, i, rate)
-    for i in range(n):
-        total = load(force, i)
-        for k in range(line.row_start[i], line.row_start[i + 1]):
-            total = fma(load(x, line.column[k]), -line.stiffness[k], total)
-        drag = total * 0.0
-        more = drag
-        start, stop = line.damping_start[i], line.damping_start[i + 1]
-        for k in range(start, stop - 1, 2):  # two sums: neither waits for the other
-            drag = fma(load(relative, line.damping_column[k]), -line.damping[k], drag)
-            at = line.damping_column[k + 1]
-            more = fma(load(relative, at), -line.damping[k + 1], more)
-        if (stop - start) % 2 == 1:
-            at = line.damping_column[stop - 1]
-            drag = fma(load(relative, at), -line.damping[stop - 1], drag)
-        drag = drag + more
-        store(force, i, (total + drag) * line.response[i])
-        if i < n_modes:
-            for k in range(line.carried_start[i], line.carried_start[i + 1]):
-                top = line.carried_column[k]
-                store(force, top, fma(drag, -line.carried[k], load(force, top)))
-    band = line.top_factor.shape[1]
-    n_top = n - n_modes
-    for i in range(n_top):
-        total = load(force, n_modes + i)
-        for k in range(1, min(band, i + 1)):
-            total = fma(load(force, n_modes + i - k), -line.top_factor[i, k], total)
-        store(force, n_modes + i, total * line.top_factor[i, 0])
-    for i in range(n_top - 1, -1, -1):
-        total = load(force, n_modes + i)
-        for k in range(1, min(band, n_top - i)):
-            total = fma(load(force, n_modes + i + k), -line.top_factor[i + k, k], total)
-        store(force, n_modes + i, total * line.top_factor[i, 0])
+            store(relative, i, 0.0)
+    none = load(x, 0) * 0.0
+    for k in range(line.woken_start[stage], line.woken_start[stage + 1]):
+        i = line.woken[k]
+        start, stop = line.carried_start[i], line.carried_start[i + 1]
+        store(x, i, _sum(line.carried, line.carried_top, start, stop, x, none))
+        store(velocity, i, _sum(line.carried, line.carried_top, start, stop, velocity, none))
+        change = _sum(line.carried, line.carried_top, start, stop, acceleration, none)
+        store(acceleration, i, change)
+
+
+@njit(cache=True, error_model="numpy")
+def _advance_line(
+    line, stage, half, dt, half_square, x, velocity, acceleration, relative, relative_rate
+):
+    """Close the last step of the guideway and open the next, without forces yet.
+
+    Leaves relative motions, and their rates at the velocity that the forces see.
+    """
+    start, tops, stop = line.stage_start[stage], line.stage_tops[stage], line.stage_start[stage + 1]
+    none = load(x, 0) * 0.0
+    for n in range(tops, stop):
+        i = entry(line.stepped, n)
+        a = load(acceleration, i)
+        v = fma(a, half, load(velocity, i))
+        place = fma(a, half_square, fma(v, dt, load(x, i)))
+        store(x, i, place)
+        store(velocity, i, fma(a, half, v))
+        store(acceleration, i, 0.0)
+        store(relative, i, place)
+        store(relative_rate, i, fma(a, dt, v))
+    for n in range(start, tops):
+        i = entry(line.stepped, n)
+        a = load(acceleration, i)
+        v = fma(a, half, load(velocity, i))
+        place = fma(a, half_square, fma(v, dt, load(x, i)))
+        store(x, i, place)
+        store(velocity, i, fma(a, half, v))
+        store(acceleration, i, 0.0)
+        along, its_rate = none, none
+        for k in range(entry(line.carried_start, i), entry(line.carried_start, i + 1)):
+            top, share = entry(line.carried_top, k), entry(line.carried, k)
+            along = fma(load(relative, top), share, along)
+            its_rate = fma(load(relative_rate, top), share, its_rate)
+        store(relative, i, place - along)
+        store(relative_rate, i, fma(a, dt, v) - its_rate)
+
+
+@njit(cache=True, error_model="numpy")
+def _line_acceleration(line, stage, relative, relative_rate, force):
+    """Turn the forces on the coordinates that are stepped into accelerations, in place."""
+    n_modes = line.square.size
+    start, tops, stop = line.stage_start[stage], line.stage_tops[stage], line.stage_start[stage + 1]
+    none = load(force, 0) * 0.0
+    damping, column = line.damping, line.damping_column
+    for n in range(start, stop):
+        i = entry(line.stepped, n)
+        if n < tops:
+            back = load(relative, i) * entry(line.square, i)
+        else:  # modes come first
+            first, last = entry(line.taken_from, n), entry(line.taken_to, n)
+            back = _sum(line.taken, line.taken_mode, first, last, force, none)
+            first = entry(line.stiffness_start, i - n_modes)
+            last = entry(line.stiffness_start, i - n_modes + 1)
+            back = _sum(line.stiffness, line.stiffness_top, first, last, relative, back)
+        drag = none
+        first, last = entry(line.damping_from, n), entry(line.damping_to, n)
+        for k in range(first, last - 1, 2):  # two sums: neither waits for the other
+            drag = fma(load(relative_rate, entry(column, k)), entry(damping, k), drag)
+            back = fma(load(relative_rate, entry(column, k + 1)), entry(damping, k + 1), back)
+        if (last - first) % 2 == 1:
+            rate = load(relative_rate, entry(column, last - 1))
+            drag = fma(rate, entry(damping, last - 1), drag)
+        store(force, i, load(force, i) - (back + drag))
+    for n in range(start, tops):
+        i = entry(line.stepped, n)
+        store(force, i, load(force, i) * entry(line.response, i))
+    for n in range(tops, stop):
+        i = entry(line.stepped, n)
+        first, last = entry(line.factor_start, n), entry(line.factor_start, n + 1)
+        total = load(force, i) - _sum(line.factor, line.factor_top, first, last, force, none)
+        store(force, i, total * entry(line.factor_inverse, n))
+    for n in range(stop - 1, tops - 1, -1):
+        i = entry(line.stepped, n)
+        total = load(force, i) * entry(line.factor_inverse, n)
+        store(force, i, total)
+        for k in range(entry(line.factor_start, n), entry(line.factor_start, n + 1)):
+            at = entry(line.factor_top, k)
+            store(force, at, load(force, at) - total * entry(line.factor, k))
 
 
 @njit(cache=True, error_model="numpy")
@@ -352,11 +591,25 @@ def _covered(line, span, tail, nose):
 
 
 @njit(cache=True, error_model="numpy")
-def _keep_extreme(outcome, place, value, time):
-    size = maximum(value, -1.0 * value)
+def _keep_peak(outcome, recent, place, value, time, dt):
+    """Keep the size of a motion's largest peak, and when it was.
+
+    A peak is the vertex of the parabola through three values in a row, of which the middle one is
+    the largest; the values themselves miss it by up to (ωΔt)²/8 of its size.
+    """
+    before, middle = load(recent, 2 * place), load(recent, 2 * place + 1)
+    rise = value - before
+    # twice the way back from the middle to the vertex [steps]; beyond 1 another value is nearer
+    back = rise / (value - middle - middle + before)
+    back = choose(1.0, maximum(back, -1.0 * back), back, 0.0)
+    peak = fma(rise * back, -0.125, middle)
+    size = maximum(peak, -1.0 * peak)
     best = load(outcome.extreme, place)
-    store(outcome.extreme_time, place, choose(size, best, time, load(outcome.extreme_time, place)))
+    when = fma(back, -0.5 * dt, time - dt + back * 0.0)
+    store(outcome.extreme_time, place, choose(size, best, when, load(outcome.extreme_time, place)))
     store(outcome.extreme, place, maximum(size, best))
+    store(recent, 2 * place, middle)
+    store(recent, 2 * place + 1, value)
 
 
 @njit(cache=True, error_model="numpy")
@@ -401,76 +654,66 @@ def passage(
     outcome
         Receives the results; extremes start at zero, gaps at the reference.
     """
-    n_dof, n_line = vehicle.inverse_mass.size, line.row_start.size - 1
+    n_dof, n_modes = vehicle.inverse_mass.size, line.square.size
+    n_line = n_modes + line.stiffness_start.size - 1
     n_cars = vehicle.body_z.size
     n_magnets = 2 * (suspension.x.size + guidance.x.size)
     dt = run.time_step
     half, half_square, per_square = 0.5 * dt, 0.5 * dt * dt, 1.0 / (dt * dt)
-    x = np.zeros((n_dof, LANES))
-    velocity = np.zeros((n_dof, LANES))  # at the middle of the step
-    predicted = np.zeros((n_dof, LANES))
-    force = np.zeros((n_dof, LANES))
-    line_x = np.zeros((n_line, LANES))
-    line_velocity = np.zeros((n_line, LANES))
-    line_predicted = np.zeros((n_line, LANES))
-    line_acceleration = np.zeros((n_line, LANES))
-    line_relative = np.zeros((n_line, LANES))
+    x = zeros(n_dof)
+    velocity = zeros(n_dof)  # at the middle of the step
+    predicted = zeros(n_dof)
+    force = zeros(n_dof)
+    scaled = zeros(vehicle.scaled_dof.size)
+    pull = zeros(vehicle.link_start.size - 1)
+    line_x = zeros(n_line)
+    line_velocity = zeros(n_line)
+    line_acceleration = zeros(n_line)
+    relative = zeros(n_line)
+    relative_rate = zeros(n_line)
     stride = line.stride
     n_rail = line.n_spans * stride
-    packed = np.zeros((max(line.upright.size, line.sideways.size), LANES))
-    roll = np.zeros((stride, LANES))
-    rail_motion = np.zeros((3, n_rail, LANES))  # right z, left z, y
-    rail_velocity = np.zeros((3, n_rail, LANES))
-    rail_force = np.zeros((3, n_rail, LANES))
-    magnet_min = np.zeros((n_magnets, LANES))
-    magnet_max = np.zeros((n_magnets, LANES))
-    magnet_gap = np.zeros((n_magnets, LANES))
-    magnet_current = np.zeros((n_magnets, LANES))
-    left_out = np.zeros((4, LANES))  # motion of midspan by left-out modes, its last change; z, y
+    packed = zeros(line.upright.size + line.sideways.size)
+    turn = zeros(stride)
+    rail_motion = zeros(3 * n_rail).reshape((3, n_rail, LANES))  # right z, left z, y
+    rail_velocity = zeros(3 * n_rail).reshape((3, n_rail, LANES))
+    rail_force = zeros(3 * n_rail).reshape((3, n_rail, LANES))
+    magnet_min = zeros(n_magnets)
+    magnet_max = zeros(n_magnets)
+    magnet_gap = zeros(n_magnets)
+    magnet_current = zeros(n_magnets)
+    left_out = zeros(4)  # motion of midspan by left-out modes, its last change; z, y
     n_sections = run.sections.shape[0]
-    filtered = np.zeros((4 * n_sections, LANES))
-    for step in range(1, run.n_steps + 1):
+    filtered = zeros(4 * n_sections)
+    recent = zeros(2 * outcome.extreme.shape[0])  # last two values of each response
+    stage = -1
+    for step in range(run.first_step, run.n_steps + 1):
         time = step * dt
         nose = run.start + run.speed * time
+        tail = nose - run.train_length
         record = run.record_every > 0 and step % run.record_every == 0
-        for i in range(n_dof):
-            a = load(force, i) * vehicle.inverse_mass[i]
-            v = fma(a, half, load(velocity, i))  # closes the last step
-            store(x, i, fma(a, half_square, fma(v, dt, load(x, i))))
-            store(predicted, i, fma(a, dt, v))
-            store(velocity, i, fma(a, half, v))
-            store(force, i, a * 0.0)
-        reached = nose >= 0.0  # until then the guideway rests
-        for i in range(n_line if reached else 0):
-            a = load(line_acceleration, i)
-            v = fma(a, half, load(line_velocity, i))
-            store(line_x, i, fma(a, half_square, fma(v, dt, load(line_x, i))))
-            store(line_predicted, i, fma(a, dt, v))
-            store(line_velocity, i, fma(a, half, v))
-            store(line_acceleration, i, a * 0.0)
-        first = max(0, int(np.floor((nose - run.train_length) / line.span_length)))
+        _advance_train(vehicle, half, dt, half_square, x, velocity, predicted, force)
+        while stage + 1 < line.stage_step.size and step >= line.stage_step[stage + 1]:
+            stage += 1
+            _change_stage(
+                line, stage, line_x, line_velocity, line_acceleration, relative, relative_rate
+            )
+        if stage >= 0:
+            _advance_line(
+                line, stage, half, dt, half_square, line_x, line_velocity, line_acceleration,
+                relative, relative_rate,
+            )  # fmt: skip
+        first = max(0, int(np.floor(tail / line.span_length)))
         last = min(line.n_spans - 1, int(np.floor(nose / line.span_length)))
         for span in range(first, last + 1):
             at = span * stride
-            begin, end = _covered(line, span, nose - run.train_length, nose)
-            up, up_end = line.upright_start[span], line.upright_start[span + 1]
-            out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
-            for quantity in range(2):
-                source = line_x if quantity == 0 else line_predicted
-                target = rail_motion if quantity == 0 else rail_velocity
-                _gather(source, line.upright, up, up_end, packed)
-                _transform(line.rail_z, up, up_end, packed, begin, end, target[0], at)
-                _gather(source, line.sideways, out, out_end, packed)
-                _transform(line.rail_roll, out, out_end, packed, begin, end, roll, 0)
-                _transform(line.rail_y, out, out_end, packed, begin, end, target[2], at)
-                for k in range(begin, end):
-                    mean, turn = load(target[0], at + k), load(roll, k)
-                    store(target[0], at + k, mean + turn)
-                    store(target[1], at + k, mean - turn)
+            begin, end = _covered(line, span, tail, nose)
+            _move_rails(line, span, begin, end, relative, packed, rail_motion)
+            _move_rails(line, span, begin, end, relative_rate, packed, rail_velocity)
             for field in range(3):
                 for k in range(begin, end):
-                    store(rail_force[field], at + k, load(roll, k) * 0.0)
-        _links(vehicle, x, predicted, force)
+                    store(rail_force[field], at + k, 0.0)
+        _links(vehicle, x, predicted, scaled, pull, force)
         _magnets(
             suspension_places, suspension, step, gains, x, predicted, force, rail_motion,
             rail_velocity, rail_force, record, outcome, magnet_min, magnet_max, magnet_gap,
@@ -484,36 +727,26 @@ def passage(
         rest_z = load(left_out, 0) * 0.0
         rest_y = rest_z
         for span in range(first, last + 1):
-            at = span * stride
-            up, up_end = line.upright_start[span], line.upright_start[span + 1]
-            out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
-            begin, end = _covered(line, span, nose - run.train_length, nose)
-            for k in range(begin, end):
-                right, left = load(rail_force[0], at + k), load(rail_force[1], at + k)
-                store(rail_force[0], at + k, right + left)
-                store(roll, k, right - left)
-            force_z, force_y = rail_force[0], rail_force[2]
-            out_of = line_acceleration
-            _project(line.rail_z, line.upright, up, up_end, begin, end, force_z, at, out_of)
-            _project(line.rail_roll, line.sideways, out, out_end, begin, end, roll, 0, out_of)
-            _project(line.rail_y, line.sideways, out, out_end, begin, end, force_y, at, out_of)
+            begin, end = _covered(line, span, tail, nose)
+            _load_line(line, span, begin, end, rail_force, turn, line_acceleration)
             if span == line.middle:
+                at = span * stride
                 for k in range(begin, end):
-                    rest_z = fma(load(force_z, at + k), line.rest[0, k], rest_z)
-                    rest_y = fma(load(roll, k), line.rest[1, k], rest_y)
-                    rest_y = fma(load(force_y, at + k), line.rest[2, k], rest_y)
-        if reached:
-            _line_acceleration(line, line_x, line_predicted, line_relative, line_acceleration)
+                    rest_z = fma(load(rail_force[0], at + k), line.rest[0, k], rest_z)
+                    rest_y = fma(load(turn, k), line.rest[1, k], rest_y)
+                    rest_y = fma(load(rail_force[2], at + k), line.rest[2, k], rest_y)
+        if stage >= 0:
+            _line_acceleration(line, stage, relative, relative_rate, line_acceleration)
         row = step // run.record_every - 1 if record else 0
         for direction in range(2):
             shift = load(line_x, 0) * 0.0
             raw = shift
-            for k in range(line.output_column.size):
-                column = line.output_column[k]
-                shift = fma(load(line_x, column), line.midspan[direction, k], shift)
-                raw = fma(
-                    load(line_acceleration, column), line.midspan_acceleration[direction, k], raw
-                )
+            n_columns = line.output_column.size
+            for k in range(n_columns):
+                column, at = entry(line.output_column, k), direction * n_columns + k
+                shift = fma(load(line_x, column), entry(line.midspan, at), shift)
+                each = entry(line.midspan_acceleration, at)
+                raw = fma(load(line_acceleration, column), each, raw)
             # What left-out modes add follows the forces at once; its acceleration is that of the
             # step before, which the band does not see.
             rest = rest_z if direction == 0 else rest_y
@@ -533,8 +766,8 @@ def passage(
                 smooth = fma(incoming, b0, load(filtered, at))
                 store(filtered, at, fma(incoming, b1, load(filtered, at + 1)) - smooth * a1)
                 store(filtered, at + 1, incoming * b2 - smooth * a2)
-            _keep_extreme(outcome, direction, shift, time)
-            _keep_extreme(outcome, 2 + direction, smooth, time)
+            _keep_peak(outcome, recent, direction, shift, time, dt)
+            _keep_peak(outcome, recent, 2 + direction, smooth, time, dt)
             if record:
                 store(outcome.history[row], direction, shift)
                 store(outcome.history[row], 2 + direction, smooth)
@@ -542,8 +775,8 @@ def passage(
             vertical, lateral = vehicle.body_z[car], vehicle.body_y[car]
             up = load(force, vertical) * vehicle.inverse_mass[vertical]
             across = load(force, lateral) * vehicle.inverse_mass[lateral]
-            _keep_extreme(outcome, 4 + car, up, time)
-            _keep_extreme(outcome, 4 + n_cars + car, across, time)
+            _keep_peak(outcome, recent, 4 + car, up, time, dt)
+            _keep_peak(outcome, recent, 4 + n_cars + car, across, time, dt)
             if record:
                 store(outcome.history[row], 4 + car, up)
                 store(outcome.history[row], 4 + n_cars + car, across)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+import numpy.typing as npt
+
 from maglev.parameters import Config
 
 
@@ -31,6 +34,22 @@ def n_steps(config: Config) -> int:
     """Number of time steps from the start until the tail has left the last span [-]."""
     way = config.passage.approach + config.guideway.length + config.train.length
     return math.ceil(way / config.passage.speed / time_step(config))
+
+
+def first_step(config: Config) -> int:
+    """Number of the first step on which anything moves [-].
+
+    Until the nose reaches the irregularity, or without one the guideway, the train rests in its
+    equilibrium over rigid straight track: nothing need be computed.
+    """
+    fade_in = config.irregularity.fade_in if config.irregularity.enabled else 0.0
+    way = config.passage.approach - fade_in
+    return max(1, math.floor(way / config.passage.speed / time_step(config) * (1 - 1e-9)))
+
+
+def nose(config: Config, step: npt.NDArray[np.int64]) -> npt.NDArray[np.float64]:
+    """Place of the nose at the end of given steps [m], the first pier at zero."""
+    return -config.passage.approach + config.passage.speed * (step * time_step(config))
 
 
 def track_range(config: Config) -> tuple[float, float]:

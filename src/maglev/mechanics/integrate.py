@@ -25,7 +25,8 @@ from maglev.mechanics._kernels import (
     Vehicle,
     passage,
 )
-from maglev.mechanics.course import n_steps, time_step, track_range
+from maglev.mechanics.activity import Stage, stages, stepped_mass, top_stiffness
+from maglev.mechanics.course import first_step, n_steps, time_step, track_range
 from maglev.mechanics.irregularity import Profile, displacement
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import (
@@ -128,7 +129,7 @@ def prepare(config: Config, profile: Profile) -> System:
         suspension_places=suspension_places._replace(rail=tracks[0][0], ramp=tracks[0][1]),
         guidance_places=guidance_places._replace(rail=tracks[1][0], ramp=tracks[1][1]),
         grounds=grounds,
-        line=_line(reduced, time_step(config)),
+        line=_line(reduced, config),
         config=config,
     )
 
@@ -326,14 +327,28 @@ def closed_train(train: train_model.TrainModel, gains: Array) -> tuple[Array, Ar
 
 
 def _vehicle(train: train_model.TrainModel) -> Vehicle:
-    rows = train.link_rows.tocsr()
+    """Train for the kernels, links and degrees of freedom in the order of their coefficients'
+    number: the processor then foresees where each sum ends."""
+    order = np.argsort(np.diff(train.link_rows.tocsr().indptr), kind="stable")
+    rows = train.link_rows.tocsr()[order].sorted_indices()
+    columns = rows.tocsc().sorted_indices()
+    dof = np.argsort(np.diff(columns.indptr), kind="stable")
+    columns = columns[:, dof]
+    link = order[np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))]
+    hangs = np.column_stack([rows.indices, train.link_stiffness[link], train.link_damping[link]])
+    scaled, number = np.unique(hangs, axis=0, return_inverse=True)
     return Vehicle(
         inverse_mass=1.0 / train.mass,
+        scaled_dof=scaled[:, 0].astype(np.int64),
+        scaled_stiffness=np.ascontiguousarray(scaled[:, 1]),
+        scaled_damping=np.ascontiguousarray(scaled[:, 2]),
         link_start=rows.indptr.astype(np.int64),
-        link_dof=rows.indices.astype(np.int64),
+        link_scaled=number.ravel().astype(np.int64),
         link_coefficient=rows.data.astype(np.float64),
-        link_stiffness=np.ascontiguousarray(train.link_stiffness, dtype=np.float64),
-        link_damping=np.ascontiguousarray(train.link_damping, dtype=np.float64),
+        pulled=dof.astype(np.int64),
+        pull_start=columns.indptr.astype(np.int64),
+        pull_link=columns.indices.astype(np.int64),
+        pull_coefficient=columns.data.astype(np.float64),
         body_z=np.ascontiguousarray(train.car_body_dof[:, 1], dtype=np.int64),
         body_y=np.ascontiguousarray(train.car_body_dof[:, 0], dtype=np.int64),
     )
@@ -470,50 +485,40 @@ def _standing_sag(
     return sag, slope
 
 
-def _line(reduced: ReducedGuideway, time_step: float) -> Line:
+def _line(reduced: ReducedGuideway, config: Config) -> Line:
     """Guideway for the kernels."""
-    columns = reduced.span_coordinates
-    least = 1e-9 * max(np.abs(z).max() for z in reduced.rail_z)
+    columns, n = reduced.span_coordinates, reduced.n_modes
+    rails = [
+        [_relative(reduced, span, shapes[span]) for span in range(len(columns))]
+        for shapes in (reduced.rail_z, reduced.rail_roll, reduced.rail_y)
+    ]
+    least = 1e-9 * max(np.abs(z).max() for z in rails[0])
 
-    def moving(*shapes: Array) -> list[IntArray]:
+    def moving(*kinds: list[Array]) -> list[IntArray]:
         """Columns of each span that move its rails."""
         return [
-            np.flatnonzero(sum(np.abs(one).max(axis=1) for one in shape) > least)
-            for shape in zip(*shapes, strict=True)
+            np.flatnonzero(sum(np.abs(one).max(axis=1) for one in shapes) > least)
+            for shapes in zip(*kinds, strict=True)
         ]
 
-    def stacked(shapes: tuple[Array, ...], chosen: list[IntArray]) -> Array:
-        rows = [shape[which] for shape, which in zip(shapes, chosen, strict=True)]
-        return np.concatenate(rows)
+    def stacked(shapes: list[Array], chosen: list[IntArray]) -> Array:
+        return np.concatenate([one[which] for one, which in zip(shapes, chosen, strict=True)])
 
     def numbered(chosen: list[IntArray]) -> tuple[IntArray, IntArray]:
         """Start of each span, and the coordinates."""
         numbers = [column[which] for column, which in zip(columns, chosen, strict=True)]
         return np.cumsum([0, *(number.size for number in numbers)]), np.concatenate(numbers)
 
-    upright = moving(reduced.rail_z)
-    sideways = moving(reduced.rail_roll, reduced.rail_y)
+    upright, sideways = moving(rails[0]), moving(*rails[1:])
     upright_start, upright_column = numbered(upright)
     sideways_start, sideways_column = numbered(sideways)
-    response = step_response(reduced, time_step)
-    damping = reduced.relative_damping.copy()
-    phase = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes]) * time_step
-    own = damping.diagonal()
-    own[: reduced.n_modes] /= np.sinc(phase / np.pi)  # rate of a stepped mode against the true one
-    damping.setdiag(own)
-    lower = np.linalg.cholesky(reduced.top_mass)
-    factor = np.zeros((lower.shape[0], 12))  # a pier top meets its neighbours' six each
-    for k in range(min(factor.shape)):
-        factor[k:, k] = np.diagonal(lower, -k)
-    factor[:, 0] = 1.0 / factor[:, 0]
-    n_spans = reduced.parameters.n_spans
-    middle = n_spans // 2
+    response = step_response(reduced, time_step(config))
+    middle = reduced.parameters.n_spans // 2
     midspan = np.stack([reduced.midspan_z, reduced.midspan_y])
-    row_start, column, stiffness = _rows(reduced.stiffness)
-    carried_start, carried_column, carried = _rows(reduced.carried)
-    damping_start, damping_column, damping_value = _rows(damping)
+    carried_start, carried_top, carried = _rows(reduced.carried)
+    stiffness_start, stiffness_top, stiffness = _rows(top_stiffness(reduced))
     return Line(
-        n_spans=n_spans,
+        n_spans=reduced.parameters.n_spans,
         span_length=reduced.parameters.span_length,
         stride=_stride(reduced.parameters),
         n_units=reduced.parameters.rail.units_per_span,
@@ -521,27 +526,101 @@ def _line(reduced: ReducedGuideway, time_step: float) -> Line:
         upright=upright_column,
         sideways_start=sideways_start,
         sideways=sideways_column,
-        rail_z=stacked(reduced.rail_z, upright),
-        rail_roll=stacked(reduced.rail_roll, sideways),
-        rail_y=stacked(reduced.rail_y, sideways),
-        n_modes=reduced.n_modes,
-        row_start=row_start,
-        column=column,
-        stiffness=stiffness,
+        rail_z=stacked(rails[0], upright),
+        rail_roll=stacked(rails[1], sideways),
+        rail_y=stacked(rails[2], sideways),
+        square=reduced.stiffness.diagonal()[:n],
+        response=response[:n],
         carried_start=carried_start,
-        carried_column=carried_column + reduced.n_modes,
+        carried_top=carried_top + n,
         carried=carried,
-        damping_start=damping_start,
-        damping_column=damping_column,
-        damping=damping_value,
-        response=response,
-        top_factor=factor,
+        stiffness_start=stiffness_start,
+        stiffness_top=stiffness_top + n,
+        stiffness=stiffness,
         output_column=columns[middle],
         midspan=midspan,
         midspan_acceleration=midspan / response[columns[middle]],
         middle=middle,
         rest=np.stack([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
+        **_stepped_rows(reduced, config, stages(config, reduced)),
     )
+
+
+def _relative(reduced: ReducedGuideway, span: int, shape: Array) -> Array:
+    """Rails of a span per relative motion of its modes and motion of its tops."""
+    columns, own = reduced.span_coordinates[span], reduced.own_modes(span)
+    tops = columns[own.size :] - reduced.n_modes
+    carried = reduced.carried[own][:, tops]
+    return np.concatenate([shape[: own.size], shape[own.size :] + carried.T @ shape[: own.size]])
+
+
+def _stepped_rows(
+    reduced: ReducedGuideway, config: Config, of_passage: list[Stage]
+) -> dict[str, Array | IntArray]:
+    """What is stepped in each stage, and with which rows: whole ones, and short ones of quiet
+    spans that leave out what is not stepped there."""
+    n = reduced.n_modes
+    damping = reduced.relative_damping.copy()
+    phase = np.sqrt(reduced.stiffness.diagonal()[:n]) * time_step(config)
+    own = damping.diagonal()
+    own[:n] /= np.sinc(phase / np.pi)  # rate of a stepped mode against the true one
+    damping.setdiag(own)
+    always = np.logical_and.reduce([stage.stepped for stage in of_passage])
+    quiet = sp.diags_array(always.astype(float)).tocsr()
+    both = sp.vstack([damping, damping @ quiet]).tocsr()
+    both.eliminate_zeros()
+    damping_start, damping_column, damping_value = _rows(both)
+    both = sp.vstack([reduced.carried.T, reduced.carried.T @ quiet[:n, :n]]).tocsr()
+    both.eliminate_zeros()
+    taken_start, taken_mode, taken = _rows(both)
+
+    starts, tops_from, stepped, rows = [0], [], [], []
+    factor_rows, factor_start, inverse = [], [0], []
+    woken, stilled = [], []
+    before = np.zeros(reduced.n_coordinates, dtype=bool)
+    for stage in of_passage:
+        modes = np.flatnonzero(stage.stepped[:n])
+        tops, factor = stepped_mass(reduced, stage.stepped)
+        coordinates = np.concatenate([modes, tops])
+        stepped.append(coordinates)
+        rows.append(coordinates + np.where(stage.awake[coordinates], 0, reduced.n_coordinates))
+        tops_from.append(starts[-1] + modes.size)
+        starts.append(starts[-1] + coordinates.size)
+        factor_start += [factor_start[-1]] * modes.size
+        inverse.append(np.zeros(modes.size))
+        inverse.append(1.0 / np.diagonal(factor))
+        for k, row in enumerate(factor):
+            met = np.flatnonzero(row[:k])
+            factor_rows.append((tops[met], row[met]))
+            factor_start.append(factor_start[-1] + met.size)
+        woken.append(np.flatnonzero((stage.stepped & ~before)[:n]))
+        stilled.append(np.flatnonzero(before & ~stage.stepped))
+        before = stage.stepped
+    row = np.concatenate(rows)
+    top_row = np.maximum(row % reduced.n_coordinates - n, 0)
+    top_row += np.where(row >= reduced.n_coordinates, reduced.n_coordinates - n, 0)
+    return {
+        "stage_step": np.array([stage.first_step for stage in of_passage]),
+        "stage_start": np.array(starts),
+        "stage_tops": np.array(tops_from),
+        "stepped": np.concatenate(stepped),
+        "damping_column": damping_column,
+        "damping": damping_value,
+        "damping_from": damping_start[row],
+        "damping_to": damping_start[row + 1],
+        "taken_mode": taken_mode,
+        "taken": taken,
+        "taken_from": taken_start[top_row],
+        "taken_to": taken_start[top_row + 1],
+        "factor_start": np.array(factor_start),
+        "factor_top": np.concatenate([top for top, _ in factor_rows]),
+        "factor": np.concatenate([value for _, value in factor_rows]),
+        "factor_inverse": np.concatenate(inverse),
+        "woken_start": np.cumsum([0, *(one.size for one in woken)]),
+        "woken": np.concatenate(woken),
+        "stilled_start": np.cumsum([0, *(one.size for one in stilled)]),
+        "stilled": np.concatenate(stilled),
+    }
 
 
 def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, Array]:
@@ -554,6 +633,7 @@ def _run(config: Config, record_every: int) -> Run:
     passage = config.passage
     dt = time_step(config)
     return Run(
+        first_step=first_step(config),
         n_steps=n_steps(config),
         time_step=dt,
         speed=passage.speed,

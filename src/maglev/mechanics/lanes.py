@@ -3,6 +3,8 @@
 Samples lie innermost in every array of the production solver, ``(…, LANES)`` in C order.  `load`
 takes one row into registers, arithmetic acts on all samples at once, `store` puts it back.  No
 operation mixes lanes, so a sample's numbers cannot depend on its neighbours, bit for bit.
+`entry` reads one number that all samples share, ``array.ravel()[place]``; Numba's own indexing
+would first ask of every place whether it counts from the end.
 
 With ``NUMBA_DISABLE_JIT=1`` the same names act on NumPy rows, so that kernels run as plain Python.
 """
@@ -15,7 +17,7 @@ from typing import Any
 
 import numba
 import numpy as np
-from llvmlite import ir
+from llvmlite import binding, ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typing.templates import Signature
@@ -23,6 +25,12 @@ from numba.extending import intrinsic, lower_builtin, models, register_model, ty
 
 LANES = 16
 """Samples side by side [-]: two AVX-512 or four AVX2 registers of doubles."""
+
+_LINE = 8
+"""Doubles in a line of the processor's cache [-]."""
+
+WIDE = bool(binding.get_host_cpu_features().get("avx512f", False))
+"""Whether the processor has 32 registers for rows, not 16: kernels then take more rows at once."""
 
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
@@ -114,6 +122,16 @@ def _store(typing_context: Any, array: Any, row: Any, value: Any) -> Any:
 
 
 @intrinsic
+def _entry(typing_context: Any, array: Any, place: Any) -> Any:
+    def codegen(context: Any, builder: Any, sig: Signature, args: Any) -> Any:
+        view = context.make_array(sig.args[0])(context, builder, args[0])
+        place = context.cast(builder, args[1], sig.args[1], types.intp)
+        return builder.load(builder.gep(view.data, [place]))
+
+    return array.dtype(array, place), codegen
+
+
+@intrinsic
 def _fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     def codegen(context: Any, builder: Any, sig: Signature, args: Any) -> Any:
         lanes = [_as_lane(context, builder, v, k) for v, k in zip(args, sig.args, strict=True)]
@@ -162,6 +180,10 @@ def _store_python(array: np.ndarray, row: int, value: Any) -> None:
     array.reshape(-1, LANES)[row] = value
 
 
+def _entry_python(array: np.ndarray, place: int) -> Any:
+    return array.reshape(-1)[place]
+
+
 def _fma_python(a: Any, b: Any, c: Any) -> Any:
     return a * b + c
 
@@ -178,9 +200,20 @@ def _choose_python(a: Any, b: Any, x: Any, y: Any) -> Any:
     return np.where(np.greater(a, b), x, y)
 
 
+@numba.njit(cache=True)
+def zeros(n_rows: int) -> np.ndarray:
+    """Rows of zeros ``(n_rows, LANES)`` that begin where a line of the processor's cache does.
+
+    Elsewhere each register of a row is read from two lines, at twice the cost.
+    """
+    whole = np.zeros(n_rows * LANES + _LINE)
+    start = -(whole.ctypes.data // 8) % _LINE
+    return whole[start : start + n_rows * LANES].reshape((n_rows, LANES))
+
+
 if numba.config.DISABLE_JIT:
     load, store, fma, choose = _load_python, _store_python, _fma_python, _choose_python
-    minimum, maximum = _minimum_python, _maximum_python
+    minimum, maximum, entry = _minimum_python, _maximum_python, _entry_python
 else:
     load, store, fma, choose = _load, _store, _fma, _choose
-    minimum, maximum = _minimum, _maximum
+    minimum, maximum, entry = _minimum, _maximum, _entry

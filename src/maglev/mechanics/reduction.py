@@ -346,7 +346,7 @@ def _basis(
         own = np.arange(start, start + n)
         columns.append(np.concatenate([own, n_modes + 6 * j + np.arange(12)]))
         start += n
-    return basis, _pruned_to(sp.vstack(carried).tocsr(), 1e-12), columns
+    return basis, _pruned_to(sp.vstack(carried).tocsr(), 1e-9), columns
 
 
 def _pruned(matrix: sp.csr_array, drop: float) -> sp.csr_array:

@@ -1,0 +1,156 @@
+"""Which coordinates of the guideway are stepped while the train is where it is.
+
+Spans under the train and their neighbours are awake: all of their coordinates are stepped, as are
+those of the middle span, which is watched.  Other spans are quiet.  Piers pass on sideways motion
+along the line, so that a quiet span keeps its low modes of that kind, and its pier tops sway; its
+other modes follow the tops without a motion of their own, and what moves up and down stands still.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from maglev.mechanics.course import n_steps, nose
+from maglev.mechanics.reduction import ReducedGuideway
+from maglev.parameters import Config
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+QUIET_CUTOFF = 100.0
+"""Highest mode that a quiet span keeps [Hz]; assumed, checked in docs/convergence.md."""
+
+AWAKE_AHEAD, AWAKE_BEHIND = 2, 2
+"""Spans ahead of the train and behind it that are awake [-]; assumed, checked likewise."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stretch of steps in which the same coordinates are stepped.
+
+    Attributes
+    ----------
+    first_step
+        Number of the first step.
+    awake : (coordinate,)
+        Whether a coordinate belongs to spans that are awake, or to their piers.
+    stepped : (coordinate,)
+        Whether it is stepped.
+    """
+
+    first_step: int
+    awake: BoolArray
+    stepped: BoolArray
+
+
+def stages(config: Config, reduced: ReducedGuideway) -> list[Stage]:
+    """Divide the steps of a passage, from that on which the nose reaches the guideway.
+
+    Parameters
+    ----------
+    config
+        Parameters of everything.
+    reduced
+        Guideway in component coordinates.
+    """
+    length, n_spans = config.guideway.span_length, config.guideway.n_spans
+    step = np.arange(1, n_steps(config) + 1)
+    at = nose(config, step)
+    step, at = step[at >= 0], at[at >= 0]
+    ahead = np.minimum(np.floor(at / length).astype(int) + AWAKE_AHEAD, n_spans - 1)
+    behind = np.floor((at - config.train.length) / length).astype(int) - AWAKE_BEHIND
+    behind = np.clip(behind, 0, n_spans - 1)
+    changes = np.flatnonzero(np.diff(ahead, prepend=-1) | np.diff(behind, prepend=-1))
+    of_span, of_pier = _neighbourhood(reduced)
+    quiet = _kept_quiet(reduced)
+    found = []
+    for k in changes:
+        spans = np.zeros(n_spans, dtype=bool)
+        spans[behind[k] : ahead[k] + 1] = True
+        spans[n_spans // 2] = True
+        piers = np.concatenate([spans, [False]]) | np.concatenate([[False], spans])
+        awake = np.where(of_span >= 0, spans[of_span], piers[of_pier])
+        found.append(Stage(int(step[k]), awake, awake | quiet))
+    return found
+
+
+def _neighbourhood(reduced: ReducedGuideway) -> tuple[IntArray, IntArray]:
+    """Span of each coordinate, -1 where it is a pier's, and its pier, of no meaning elsewhere."""
+    n, n_modes = reduced.n_coordinates, reduced.n_modes
+    n_piers = reduced.parameters.n_spans + 1
+    of_span, of_pier = np.full(n, -1), np.zeros(n, dtype=np.int64)
+    for span in range(reduced.parameters.n_spans):
+        of_span[reduced.own_modes(span)] = span
+    in_piers = np.flatnonzero(of_span[:n_modes] < 0)
+    of_pier[in_piers] = np.repeat(np.arange(n_piers), in_piers.size // n_piers)
+    of_pier[n_modes:] = np.repeat(np.arange(n_piers), (n - n_modes) // n_piers)
+    return of_span, of_pier
+
+
+def _kept_quiet(reduced: ReducedGuideway) -> BoolArray:
+    """Coordinates that are stepped in quiet spans too: low modes that sway, and their tops."""
+    n_modes = reduced.n_modes
+    joined = abs(reduced.relative.T) + abs(reduced.relative) + abs(reduced.relative_damping)
+    tops = sp.block_diag(
+        [sp.csr_array((n_modes, n_modes)), abs(pruned_mass(reduced)) + abs(top_stiffness(reduced))]
+    )
+    _, label = connected_components(joined + tops, directed=False)
+    middle = reduced.span_coordinates[reduced.parameters.n_spans // 2]
+    size = np.abs(reduced.midspan_y)
+    sways = np.isin(label, label[middle[size > 1e-6 * size.max()]])
+    low = np.ones(reduced.n_coordinates, dtype=bool)
+    square = reduced.stiffness.diagonal()[:n_modes]
+    low[:n_modes] = square < (2 * np.pi * QUIET_CUTOFF) ** 2
+    return sways & low
+
+
+def top_stiffness(reduced: ReducedGuideway) -> sp.csr_array:
+    """Stiffness between pier tops (top, top) when no mode moves relative to them."""
+    n = reduced.n_modes
+    square = sp.diags_array(reduced.stiffness.diagonal()[:n])
+    dense = (reduced.stiffness[n:, n:] - reduced.carried.T @ square @ reduced.carried).toarray()
+    return _without_noise(dense)
+
+
+def pruned_mass(reduced: ReducedGuideway) -> sp.csr_array:
+    """Mass matrix of the pier tops (top, top) without what rounding leaves."""
+    return _without_noise(reduced.top_mass)
+
+
+def _without_noise(matrix: Array) -> sp.csr_array:
+    scale = np.sqrt(np.diagonal(matrix))
+    return sp.csr_array(np.where(np.abs(matrix) > 1e-10 * np.outer(scale, scale), matrix, 0.0))
+
+
+def stepped_mass(reduced: ReducedGuideway, stepped: BoolArray) -> tuple[IntArray, Array]:
+    """Pier tops that are stepped, and the lower Cholesky factor of their mass.
+
+    Modes that are not stepped follow the tops with their mass.
+
+    Parameters
+    ----------
+    reduced
+        Guideway in component coordinates.
+    stepped : (coordinate,)
+        Whether a coordinate is stepped.
+
+    Returns
+    -------
+    tops : (stepped top,)
+        Coordinates, those that meet next to each other.
+    factor : (stepped top, stepped top)
+        Lower triangular.
+    """
+    n = reduced.n_modes
+    follows = reduced.carried[np.flatnonzero(~stepped[:n])]
+    mass = (pruned_mass(reduced) + follows.T @ follows).tocsr()
+    tops = np.flatnonzero(stepped[n:])
+    _, label = connected_components(mass[tops][:, tops], directed=False)
+    tops = tops[np.argsort(label, kind="stable")]
+    return n + tops, np.linalg.cholesky(mass[tops][:, tops].toarray())
