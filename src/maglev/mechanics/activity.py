@@ -1,9 +1,9 @@
 """Which coordinates of the guideway are stepped while the train is where it is.
 
 Spans under the train and their neighbours are awake: all of their coordinates are stepped, as are
-those of the middle span, which is watched.  Other spans are quiet.  Piers pass on sideways motion
-along the line, so that a quiet span keeps its low modes of that kind, and its pier tops sway; its
-other modes follow the tops without a motion of their own, and what moves up and down stands still.
+those of the middle span, which is watched.  Other spans are quiet.  Piers pass motion on along the
+line, so that quiet spans do not rest: their pier tops and low modes are stepped, and their other
+modes follow the pier tops without a motion of their own.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 QUIET_CUTOFF = 100.0
-"""Highest mode that a quiet span keeps [Hz]; assumed, checked in docs/convergence.md."""
+"""Highest mode of quiet spans and their piers that is stepped [Hz]; assumed, checked in
+docs/convergence.md."""
 
-AWAKE_AHEAD, AWAKE_BEHIND = 2, 2
-"""Spans ahead of the train and behind it that are awake [-]; assumed, checked likewise."""
+AWAKE_BESIDE = 2
+"""Spans ahead of the train, and behind it, that are awake [-]; assumed, checked likewise."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,8 @@ def stages(config: Config, reduced: ReducedGuideway) -> list[Stage]:
     step = np.arange(1, n_steps(config) + 1)
     at = nose(config, step)
     step, at = step[at >= 0], at[at >= 0]
-    ahead = np.minimum(np.floor(at / length).astype(int) + AWAKE_AHEAD, n_spans - 1)
-    behind = np.floor((at - config.train.length) / length).astype(int) - AWAKE_BEHIND
+    ahead = np.minimum(np.floor(at / length).astype(int) + AWAKE_BESIDE, n_spans - 1)
+    behind = np.floor((at - config.train.length) / length).astype(int) - AWAKE_BESIDE
     behind = np.clip(behind, 0, n_spans - 1)
     changes = np.flatnonzero(np.diff(ahead, prepend=-1) | np.diff(behind, prepend=-1))
     of_span, of_pier = _neighbourhood(reduced)
@@ -94,20 +95,11 @@ def _neighbourhood(reduced: ReducedGuideway) -> tuple[IntArray, IntArray]:
 
 
 def _kept_quiet(reduced: ReducedGuideway) -> BoolArray:
-    """Coordinates that are stepped in quiet spans too: low modes that sway, and their tops."""
-    n_modes = reduced.n_modes
-    joined = abs(reduced.relative.T) + abs(reduced.relative) + abs(reduced.relative_damping)
-    tops = sp.block_diag(
-        [sp.csr_array((n_modes, n_modes)), abs(pruned_mass(reduced)) + abs(top_stiffness(reduced))]
-    )
-    _, label = connected_components(joined + tops, directed=False)
-    middle = reduced.span_coordinates[reduced.parameters.n_spans // 2]
-    size = np.abs(reduced.midspan_y)
-    sways = np.isin(label, label[middle[size > 1e-6 * size.max()]])
-    low = np.ones(reduced.n_coordinates, dtype=bool)
-    square = reduced.stiffness.diagonal()[:n_modes]
-    low[:n_modes] = square < (2 * np.pi * QUIET_CUTOFF) ** 2
-    return sways & low
+    """Coordinates that are stepped in quiet spans too: low modes, and pier tops."""
+    kept = np.ones(reduced.n_coordinates, dtype=bool)
+    square = reduced.stiffness.diagonal()[: reduced.n_modes]
+    kept[: reduced.n_modes] = square < (2 * np.pi * QUIET_CUTOFF) ** 2
+    return kept
 
 
 def top_stiffness(reduced: ReducedGuideway) -> sp.csr_array:
