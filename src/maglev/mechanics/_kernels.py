@@ -73,9 +73,8 @@ class MagnetRows(NamedTuple):
 class Line(NamedTuple):
     """Guideway in component coordinates: modes of spans, modes of piers, pier tops.
 
-    A mode's relative motion is its own less what the pier tops take along of it.  Rails, springs
-    and dampers know relative motions only.  While the train is where it is, only some coordinates
-    are stepped: those of a stage.  The other modes have no relative motion, the other tops stand.
+    A mode counts from where the pier tops would take it if it were rigid.  While the train is where
+    it is, only the coordinates of a stage are stepped; the other modes follow the pier tops.
     """
 
     n_spans: int
@@ -86,7 +85,7 @@ class Line(NamedTuple):
     upright: np.ndarray  # coordinates that move a span's rails up and down
     sideways_start: np.ndarray  # (span + 1,)
     sideways: np.ndarray  # coordinates that roll a span or move it sideways
-    rail_z: np.ndarray  # (upright, stride) per relative motion, as the next two
+    rail_z: np.ndarray  # (upright, stride)
     rail_roll: np.ndarray  # (sideways, stride)
     rail_y: np.ndarray  # (sideways, stride)
     square: np.ndarray  # (mode,) squared circular frequency [1/s^2]
@@ -113,8 +112,6 @@ class Line(NamedTuple):
     factor_top: np.ndarray  # coordinate
     factor: np.ndarray
     factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal
-    woken_start: np.ndarray  # (stage + 1,) modes that had no relative motion before
-    woken: np.ndarray
     stilled_start: np.ndarray  # (stage + 1,) coordinates that were stepped before
     stilled: np.ndarray
     output_column: np.ndarray  # (output column,) coordinates that move midspan
@@ -165,14 +162,20 @@ class Outcome(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _advance_train(vehicle, half, dt, half_square, x, velocity, predicted, force):
-    """Close the last step of the train and open the next; velocities are those half-way."""
+def _advance_train(vehicle, dt, x, velocity, before, predicted, force):
+    """Close the last step of the train and open the next.
+
+    Velocities are those half-way between steps; ``before`` holds the acceleration of the step
+    before, from which and the last one the velocity is predicted that the forces see.
+    """
+    half = 0.5 * dt
     for i in range(vehicle.inverse_mass.size):
         a = load(force, i) * entry(vehicle.inverse_mass, i)
-        v = fma(a, half, load(velocity, i))
-        store(x, i, fma(a, half_square, fma(v, dt, load(x, i))))
-        store(predicted, i, fma(a, dt, v))
-        store(velocity, i, fma(a, half, v))
+        v = fma(a, dt, load(velocity, i))
+        store(x, i, fma(v, dt, load(x, i)))
+        store(predicted, i, fma(load(before, i), -half, fma(a, dt, v)))
+        store(velocity, i, v)
+        store(before, i, a)
 
 
 @njit(cache=True, error_model="numpy")
@@ -478,65 +481,34 @@ def _load_line(line, span, begin, end, rail_force, turn, force):
 
 
 @njit(cache=True, error_model="numpy")
-def _change_stage(line, stage, x, velocity, acceleration, relative, relative_rate):
-    """Let coordinates go that are no longer stepped, and take up those that are again."""
-    n_modes = line.square.size
+def _still(line, stage, x, velocity, before, acceleration, rate):
+    """Leave the coordinates alone that are no longer stepped: modes at rest."""
     for k in range(line.stilled_start[stage], line.stilled_start[stage + 1]):
         i = line.stilled[k]
+        store(x, i, 0.0)
         store(velocity, i, 0.0)
+        store(before, i, 0.0)
         store(acceleration, i, 0.0)
-        store(relative_rate, i, 0.0)
-        if i < n_modes:
-            store(relative, i, 0.0)
-    none = load(x, 0) * 0.0
-    for k in range(line.woken_start[stage], line.woken_start[stage + 1]):
-        i = line.woken[k]
-        start, stop = line.carried_start[i], line.carried_start[i + 1]
-        store(x, i, _sum(line.carried, line.carried_top, start, stop, x, none))
-        store(velocity, i, _sum(line.carried, line.carried_top, start, stop, velocity, none))
-        change = _sum(line.carried, line.carried_top, start, stop, acceleration, none)
-        store(acceleration, i, change)
+        store(rate, i, 0.0)
 
 
 @njit(cache=True, error_model="numpy")
-def _advance_line(
-    line, stage, half, dt, half_square, x, velocity, acceleration, relative, relative_rate
-):
-    """Close the last step of the guideway and open the next, without forces yet.
-
-    Leaves relative motions, and their rates at the velocity that the forces see.
-    """
-    start, tops, stop = line.stage_start[stage], line.stage_tops[stage], line.stage_start[stage + 1]
-    none = load(x, 0) * 0.0
-    for n in range(tops, stop):
+def _advance_line(line, stage, dt, x, velocity, before, acceleration, rate):
+    """As `_advance_train` for what is stepped of the guideway; leaves no accelerations."""
+    half = 0.5 * dt
+    for n in range(line.stage_start[stage], line.stage_start[stage + 1]):
         i = entry(line.stepped, n)
         a = load(acceleration, i)
-        v = fma(a, half, load(velocity, i))
-        place = fma(a, half_square, fma(v, dt, load(x, i)))
-        store(x, i, place)
-        store(velocity, i, fma(a, half, v))
+        v = fma(a, dt, load(velocity, i))
+        store(x, i, fma(v, dt, load(x, i)))
+        store(rate, i, fma(load(before, i), -half, fma(a, dt, v)))
+        store(velocity, i, v)
+        store(before, i, a)
         store(acceleration, i, 0.0)
-        store(relative, i, place)
-        store(relative_rate, i, fma(a, dt, v))
-    for n in range(start, tops):
-        i = entry(line.stepped, n)
-        a = load(acceleration, i)
-        v = fma(a, half, load(velocity, i))
-        place = fma(a, half_square, fma(v, dt, load(x, i)))
-        store(x, i, place)
-        store(velocity, i, fma(a, half, v))
-        store(acceleration, i, 0.0)
-        along, its_rate = none, none
-        for k in range(entry(line.carried_start, i), entry(line.carried_start, i + 1)):
-            top, share = entry(line.carried_top, k), entry(line.carried, k)
-            along = fma(load(relative, top), share, along)
-            its_rate = fma(load(relative_rate, top), share, its_rate)
-        store(relative, i, place - along)
-        store(relative_rate, i, fma(a, dt, v) - its_rate)
 
 
 @njit(cache=True, error_model="numpy")
-def _line_acceleration(line, stage, relative, relative_rate, force):
+def _line_acceleration(line, stage, x, velocity, force):
     """Turn the forces on the coordinates that are stepped into accelerations, in place."""
     n_modes = line.square.size
     start, tops, stop = line.stage_start[stage], line.stage_tops[stage], line.stage_start[stage + 1]
@@ -545,25 +517,21 @@ def _line_acceleration(line, stage, relative, relative_rate, force):
     for n in range(start, stop):
         i = entry(line.stepped, n)
         if n < tops:
-            back = load(relative, i) * entry(line.square, i)
+            back = load(x, i) * entry(line.square, i)
         else:  # modes come first
             first, last = entry(line.taken_from, n), entry(line.taken_to, n)
             back = _sum(line.taken, line.taken_mode, first, last, force, none)
             first = entry(line.stiffness_start, i - n_modes)
             last = entry(line.stiffness_start, i - n_modes + 1)
-            back = _sum(line.stiffness, line.stiffness_top, first, last, relative, back)
+            back = _sum(line.stiffness, line.stiffness_top, first, last, x, back)
         drag = none
         first, last = entry(line.damping_from, n), entry(line.damping_to, n)
         for k in range(first, last - 1, 2):  # two sums: neither waits for the other
-            drag = fma(load(relative_rate, entry(column, k)), entry(damping, k), drag)
-            back = fma(load(relative_rate, entry(column, k + 1)), entry(damping, k + 1), back)
+            drag = fma(load(velocity, entry(column, k)), entry(damping, k), drag)
+            back = fma(load(velocity, entry(column, k + 1)), entry(damping, k + 1), back)
         if (last - first) % 2 == 1:
-            rate = load(relative_rate, entry(column, last - 1))
-            drag = fma(rate, entry(damping, last - 1), drag)
+            drag = fma(load(velocity, entry(column, last - 1)), entry(damping, last - 1), drag)
         store(force, i, load(force, i) - (back + drag))
-    for n in range(start, tops):
-        i = entry(line.stepped, n)
-        store(force, i, load(force, i) * entry(line.response, i))
     for n in range(tops, stop):
         i = entry(line.stepped, n)
         first, last = entry(line.factor_start, n), entry(line.factor_start, n + 1)
@@ -576,6 +544,11 @@ def _line_acceleration(line, stage, relative, relative_rate, force):
         for k in range(entry(line.factor_start, n), entry(line.factor_start, n + 1)):
             at = entry(line.factor_top, k)
             store(force, at, load(force, at) - total * entry(line.factor, k))
+    for n in range(start, tops):
+        i = entry(line.stepped, n)
+        first, last = entry(line.carried_start, i), entry(line.carried_start, i + 1)
+        along = _sum(line.carried, line.carried_top, first, last, force, none)
+        store(force, i, (load(force, i) - along) * entry(line.response, i))
 
 
 @njit(cache=True, error_model="numpy")
@@ -659,18 +632,19 @@ def passage(
     n_cars = vehicle.body_z.size
     n_magnets = 2 * (suspension.x.size + guidance.x.size)
     dt = run.time_step
-    half, half_square, per_square = 0.5 * dt, 0.5 * dt * dt, 1.0 / (dt * dt)
+    per_square = 1.0 / (dt * dt)
     x = zeros(n_dof)
     velocity = zeros(n_dof)  # at the middle of the step
+    before = zeros(n_dof)  # acceleration of the step before
     predicted = zeros(n_dof)
     force = zeros(n_dof)
     scaled = zeros(vehicle.scaled_dof.size)
     pull = zeros(vehicle.link_start.size - 1)
     line_x = zeros(n_line)
     line_velocity = zeros(n_line)
+    line_before = zeros(n_line)
     line_acceleration = zeros(n_line)
-    relative = zeros(n_line)
-    relative_rate = zeros(n_line)
+    line_rate = zeros(n_line)
     stride = line.stride
     n_rail = line.n_spans * stride
     packed = zeros(line.upright.size + line.sideways.size)
@@ -692,24 +666,21 @@ def passage(
         nose = run.start + run.speed * time
         tail = nose - run.train_length
         record = run.record_every > 0 and step % run.record_every == 0
-        _advance_train(vehicle, half, dt, half_square, x, velocity, predicted, force)
+        _advance_train(vehicle, dt, x, velocity, before, predicted, force)
         while stage + 1 < line.stage_step.size and step >= line.stage_step[stage + 1]:
             stage += 1
-            _change_stage(
-                line, stage, line_x, line_velocity, line_acceleration, relative, relative_rate
-            )
+            _still(line, stage, line_x, line_velocity, line_before, line_acceleration, line_rate)
         if stage >= 0:
             _advance_line(
-                line, stage, half, dt, half_square, line_x, line_velocity, line_acceleration,
-                relative, relative_rate,
-            )  # fmt: skip
+                line, stage, dt, line_x, line_velocity, line_before, line_acceleration, line_rate
+            )
         first = max(0, int(np.floor(tail / line.span_length)))
         last = min(line.n_spans - 1, int(np.floor(nose / line.span_length)))
         for span in range(first, last + 1):
             at = span * stride
             begin, end = _covered(line, span, tail, nose)
-            _move_rails(line, span, begin, end, relative, packed, rail_motion)
-            _move_rails(line, span, begin, end, relative_rate, packed, rail_velocity)
+            _move_rails(line, span, begin, end, line_x, packed, rail_motion)
+            _move_rails(line, span, begin, end, line_rate, packed, rail_velocity)
             for field in range(3):
                 for k in range(begin, end):
                     store(rail_force[field], at + k, 0.0)
@@ -736,7 +707,7 @@ def passage(
                     rest_y = fma(load(turn, k), line.rest[1, k], rest_y)
                     rest_y = fma(load(rail_force[2], at + k), line.rest[2, k], rest_y)
         if stage >= 0:
-            _line_acceleration(line, stage, relative, relative_rate, line_acceleration)
+            _line_acceleration(line, stage, line_x, line_rate, line_acceleration)
         row = step // run.record_every - 1 if record else 0
         for direction in range(2):
             shift = load(line_x, 0) * 0.0

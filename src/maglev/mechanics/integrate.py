@@ -514,7 +514,9 @@ def _line(reduced: ReducedGuideway, config: Config) -> Line:
     sideways_start, sideways_column = numbered(sideways)
     response = step_response(reduced, time_step(config))
     middle = reduced.parameters.n_spans // 2
-    midspan = np.stack([reduced.midspan_z, reduced.midspan_y])
+    midspan = np.stack(
+        [_relative(reduced, middle, shape) for shape in (reduced.midspan_z, reduced.midspan_y)]
+    )
     carried_start, carried_top, carried = _rows(reduced.carried)
     stiffness_start, stiffness_top, stiffness = _rows(top_stiffness(reduced))
     return Line(
@@ -547,7 +549,7 @@ def _line(reduced: ReducedGuideway, config: Config) -> Line:
 
 
 def _relative(reduced: ReducedGuideway, span: int, shape: Array) -> Array:
-    """Rails of a span per relative motion of its modes and motion of its tops."""
+    """Motion (column, …) in a span when its modes count from where the pier tops take them."""
     columns, own = reduced.span_coordinates[span], reduced.own_modes(span)
     tops = columns[own.size :] - reduced.n_modes
     carried = reduced.carried[own][:, tops]
@@ -576,7 +578,7 @@ def _stepped_rows(
 
     starts, tops_from, stepped, rows = [0], [], [], []
     factor_rows, factor_start, inverse = [], [0], []
-    woken, stilled = [], []
+    stilled = []
     before = np.zeros(reduced.n_coordinates, dtype=bool)
     for stage in of_passage:
         modes = np.flatnonzero(stage.stepped[:n])
@@ -593,7 +595,6 @@ def _stepped_rows(
             met = np.flatnonzero(row[:k])
             factor_rows.append((tops[met], row[met]))
             factor_start.append(factor_start[-1] + met.size)
-        woken.append(np.flatnonzero((stage.stepped & ~before)[:n]))
         stilled.append(np.flatnonzero(before & ~stage.stepped))
         before = stage.stepped
     row = np.concatenate(rows)
@@ -616,8 +617,6 @@ def _stepped_rows(
         "factor_top": np.concatenate([top for top, _ in factor_rows]),
         "factor": np.concatenate([value for _, value in factor_rows]),
         "factor_inverse": np.concatenate(inverse),
-        "woken_start": np.cumsum([0, *(one.size for one in woken)]),
-        "woken": np.concatenate(woken),
         "stilled_start": np.cumsum([0, *(one.size for one in stilled)]),
         "stilled": np.concatenate(stilled),
     }

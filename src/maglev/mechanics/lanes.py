@@ -20,6 +20,7 @@ import numpy as np
 from llvmlite import binding, ir
 from numba import types
 from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.core.typing.templates import Signature
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
@@ -128,6 +129,8 @@ def _entry(typing_context: Any, array: Any, place: Any) -> Any:
         place = context.cast(builder, args[1], sig.args[1], types.intp)
         return builder.load(builder.gep(view.data, [place]))
 
+    if array.layout != "C":
+        raise TypingError(f"entry needs an array in C order, got {array}")
     return array.dtype(array, place), codegen
 
 
