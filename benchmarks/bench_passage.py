@@ -373,12 +373,8 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
         function(1)  # compiles
         return timed(lambda: function(n), 3).process / n / LANES
 
-    links = per_call(
-        2000, lambda n: _repeat_links(n, vehicle, x, v, scaled, link_pull, force)
-    )
-    states = per_call(
-        2000, lambda n: _repeat_train(n, vehicle, dt, x, v * 0, predicted, at_rest)
-    )
+    links = per_call(2000, lambda n: _repeat_links(n, vehicle, x, v, scaled, link_pull, force))
+    states = per_call(2000, lambda n: _repeat_train(n, vehicle, dt, x, v * 0, predicted, at_rest))
     guideway = 0.0
     for stage, share in enumerate(steps_of_stages(system) / n_steps(system.config)):
         guideway += share * per_call(

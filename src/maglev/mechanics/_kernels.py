@@ -656,7 +656,8 @@ def passage(
     magnet_max = zeros(n_magnets)
     magnet_gap = zeros(n_magnets)
     magnet_current = zeros(n_magnets)
-    left_out = zeros(4)  # motion of midspan by left-out modes, its last change; z, y
+    # of midspan: motion by left-out modes, its last change, acceleration by the others; z, y
+    left_out = zeros(6)
     n_sections = run.sections.shape[0]
     filtered = zeros(4 * n_sections)
     recent = zeros(2 * outcome.extreme.shape[0])  # last two values of each response
@@ -709,6 +710,10 @@ def passage(
         if stage >= 0:
             _line_acceleration(line, stage, line_x, line_rate, line_acceleration)
         row = step // run.record_every - 1 if record else 0
+        # girder accelerations come a step late
+        late = run.record_every > 0 and step > run.record_every
+        late = late and (step - 1) % run.record_every == 0
+        row_before = (step - 1) // run.record_every - 1 if late else 0
         for direction in range(2):
             shift = load(line_x, 0) * 0.0
             raw = shift
@@ -718,18 +723,16 @@ def passage(
                 shift = fma(load(line_x, column), entry(line.midspan, at), shift)
                 each = entry(line.midspan_acceleration, at)
                 raw = fma(load(line_acceleration, column), each, raw)
-            # What left-out modes add follows the forces at once; its acceleration is that of the
-            # step before, which the band does not see.
+            # What left-out modes add follows the forces at once; its acceleration, a second
+            # difference, is that of the step before, and so is what it joins.
             rest = rest_z if direction == 0 else rest_y
-            last_rest, last_change = (
-                load(left_out, 2 * direction),
-                load(left_out, 2 * direction + 1),
-            )
-            change = rest - last_rest
-            store(left_out, 2 * direction, rest)
-            store(left_out, 2 * direction + 1, change)
+            change = rest - load(left_out, 3 * direction)
+            bend = change - load(left_out, 3 * direction + 1)
             shift = shift + rest
-            smooth = fma(change - last_change, per_square, raw)
+            smooth = fma(bend, per_square, load(left_out, 3 * direction + 2))
+            store(left_out, 3 * direction, rest)
+            store(left_out, 3 * direction + 1, change)
+            store(left_out, 3 * direction + 2, raw)
             for section in range(n_sections):
                 b0, b1, b2, _, a1, a2 = run.sections[section]
                 at = 2 * (direction * n_sections + section)
@@ -738,10 +741,11 @@ def passage(
                 store(filtered, at, fma(incoming, b1, load(filtered, at + 1)) - smooth * a1)
                 store(filtered, at + 1, incoming * b2 - smooth * a2)
             _keep_peak(outcome, recent, direction, shift, time, dt)
-            _keep_peak(outcome, recent, 2 + direction, smooth, time, dt)
+            _keep_peak(outcome, recent, 2 + direction, smooth, time - dt, dt)
             if record:
                 store(outcome.history[row], direction, shift)
-                store(outcome.history[row], 2 + direction, smooth)
+            if late:
+                store(outcome.history[row_before], 2 + direction, smooth)
         for car in range(n_cars):
             vertical, lateral = vehicle.body_z[car], vehicle.body_y[car]
             up = load(force, vertical) * vehicle.inverse_mass[vertical]

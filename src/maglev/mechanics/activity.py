@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from maglev.mechanics.course import n_steps, nose
+from maglev.mechanics.course import n_steps, nose, time_step
 from maglev.mechanics.reduction import ReducedGuideway
 from maglev.parameters import Config
 
@@ -62,7 +62,7 @@ def stages(config: Config, reduced: ReducedGuideway) -> list[Stage]:
     """
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
     step = np.arange(1, n_steps(config) + 1)
-    at = nose(config, step)
+    at = nose(config, step * time_step(config))
     step, at = step[at >= 0], at[at >= 0]
     ahead = np.minimum(np.floor(at / length).astype(int) + AWAKE_BESIDE, n_spans - 1)
     behind = np.floor((at - config.train.length) / length).astype(int) - AWAKE_BESIDE

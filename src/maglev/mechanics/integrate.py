@@ -26,7 +26,7 @@ from maglev.mechanics._kernels import (
     passage,
 )
 from maglev.mechanics.activity import Stage, stages, stepped_mass, top_stiffness
-from maglev.mechanics.course import first_step, n_steps, time_step, track_range
+from maglev.mechanics.course import first_step, n_steps, start, time_step, track_range
 from maglev.mechanics.irregularity import Profile, displacement
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import (
@@ -222,18 +222,18 @@ def stability_limit(
 ) -> float:
     """Largest stable time step of the production solver's scheme [s].
 
-    Modes of the whole guideway, and of one car with its magnets closed linearly at the mean gains,
-    are stable for ωΔt < 2(√(1 + ζ²) − ζ) where ω is the circular frequency and ζ the damping
-    ratio.  A component mode, stepped on its own with its response and its damping, has a limit of
-    its own: where its amplification passes one (docs/theory/integration.md).
+    Modes of the whole guideway as it is stepped, those of one car with its magnets closed linearly
+    at the mean gains, and component modes on their own each have a limit that depends on their
+    damping ratio: where the amplification of the scheme passes one
+    (docs/theory/integration.md, eq. 5).
     """
     ratio, dt = config.guideway.damping_ratio, time_step(config)
-    damped = math.sqrt(1 + ratio**2) - ratio
-    mass = reduced.mass.toarray()
-    mass[np.diag_indices(reduced.n_modes)] /= step_response(reduced, dt)[: reduced.n_modes]
-    square = scipy.linalg.eigvalsh(reduced.stiffness.toarray(), mass)[-1]
+    square = scipy.linalg.eigvalsh(stepped_stiffness(reduced), stepped_inertia(reduced, dt))[-1]
     fastest = math.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes].max(initial=1e-12))
-    limits = [2 * damped / math.sqrt(square), _largest_phase(DAMPING_MARGIN * ratio) / fastest]
+    limits = [
+        _largest_phase(ratio) / math.sqrt(square),
+        _largest_phase(DAMPING_MARGIN * ratio, exact=True) / fastest,
+    ]
     one_car = train
     if config.train.n_cars > 1:
         one_car = train_model.build(config.train.model_copy(update={"n_cars": 1}))
@@ -244,27 +244,50 @@ def stability_limit(
     poles = scipy.linalg.eigvals(state)
     size = np.abs(poles)
     moving = size > 1e-6
-    zeta = np.clip(-poles.real[moving] / size[moving], 0.0, None)
-    limits.append(float((2 * (np.sqrt(1 + zeta**2) - zeta) / size[moving]).min()))
+    zeta = np.clip(-poles.real[moving] / size[moving], 0.0, 1.0)
+    ratios = np.linspace(0.0, 1.0, 21)
+    phases = np.interp(zeta, ratios, [_largest_phase(one) for one in ratios])
+    limits.append(float((phases / size[moving]).min()))
     return min(limits)
 
 
-def _largest_phase(ratio: float) -> float:
-    """Largest ωΔt at which a component mode with this damping ratio does not grow [-]."""
+def _largest_phase(ratio: float, *, exact: bool = False) -> float:
+    """Largest ωΔt at which a motion with this damping ratio does not grow [-].
+
+    ``exact`` takes it as a component mode, which is stepped with its response and damping.
+    """
     phases = np.arange(0.02, np.pi, 0.02)
-    scale = np.sinc(phases / (2 * np.pi)) ** 2
-    rate = 2 * ratio * phases / np.sinc(phases / np.pi)
-    # Displacement, velocity and acceleration after a step per those before it, with Δt = 1.
-    ahead, halfway = np.array([1.0, 1.0, 0.5]), np.array([0.0, 1.0, 0.5])
-    acceleration = -scale[:, None] * (
-        phases[:, None] ** 2 * ahead + rate[:, None] * np.array([0.0, 1.0, 1.0])
-    )
-    steps = np.stack(
-        [np.broadcast_to(ahead, acceleration.shape), halfway + 0.5 * acceleration, acceleration],
-        axis=1,
-    )
+    scale, rate = np.ones_like(phases), 2 * ratio * phases
+    if exact:
+        scale = np.sinc(phases / (2 * np.pi)) ** 2
+        rate /= np.sinc(phases / np.pi)
+    # Displacement, velocity half a step before, the last two accelerations; Δt = 1.
+    kicked = np.array([0.0, 1.0, 1.0, 0.0])
+    ahead = np.array([1.0, 1.0, 1.0, 0.0])
+    predicted = kicked + np.array([0.0, 0.0, 1.0, -0.5])
+    acceleration = -scale[:, None] * (phases[:, None] ** 2 * ahead + rate[:, None] * predicted)
+    shape = acceleration.shape
+    steps = [np.broadcast_to(row, shape) for row in (ahead, kicked, np.array([0.0, 0, 1, 0]))]
+    steps = np.stack([steps[0], steps[1], acceleration, steps[2]], axis=1)
     grows = np.abs(np.linalg.eigvals(steps)).max(axis=1) > 1 + 1e-9
     return float(phases[grows.argmax()] - 0.02) if grows.any() else float(phases[-1])
+
+
+def stepped_stiffness(reduced: ReducedGuideway) -> Array:
+    """Stiffness (coordinate, coordinate) when modes count from where the pier tops take them."""
+    return scipy.linalg.block_diag(
+        np.diag(reduced.stiffness.diagonal()[: reduced.n_modes]), top_stiffness(reduced).toarray()
+    )
+
+
+def stepped_inertia(reduced: ReducedGuideway, time_step: float) -> Array:
+    """Mass (coordinate, coordinate) to go with `stepped_stiffness`, as a time step makes it.
+
+    A component mode has the inverse of its response as the mass of its own motion.
+    """
+    carried = reduced.carried.toarray()
+    own = np.diag(1 / step_response(reduced, time_step)[: reduced.n_modes])
+    return np.block([[own, carried], [carried.T, reduced.top_mass + carried.T @ carried]])
 
 
 def step_response(reduced: ReducedGuideway, time_step: float) -> Array:
@@ -403,9 +426,9 @@ def _places(
 ) -> tuple[Places, Ground]:
     """Tabulate pieces of rail where the poles are after whole numbers of steps; no track yet."""
     advance = config.passage.speed * time_step(config)
-    start = (rows.x[:, None] + rows.offset - config.passage.approach) / advance
-    whole = np.floor(start + 1e-6)
-    beyond = np.round(start - whole, 6)  # share of a step; places with the same one form a series
+    begins = (rows.x[:, None] + rows.offset + start(config)) / advance
+    whole = np.floor(begins + 1e-6)
+    beyond = np.round(begins - whole, 6)  # share of a step; places with the same one form a series
     series = np.unique(beyond)
     earliest = int(whole.min())
     count = int(whole.max()) - earliest + n_steps(config) + 1
@@ -636,7 +659,7 @@ def _run(config: Config, record_every: int) -> Run:
         n_steps=n_steps(config),
         time_step=dt,
         speed=passage.speed,
-        start=-passage.approach,
+        start=start(config),
         train_length=config.train.length,
         gap_contact=passage.gap_contact,
         gap_lost=passage.gap_lost,

@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import n_steps, time_step
+from maglev.mechanics.course import n_steps, nose, time_step
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.responses import Passages, acceleration_filter, checked_gains
 from maglev.parameters import Config
@@ -226,7 +226,7 @@ def integrate(
 
     for step in tqdm(range(last), disable=not progress, desc="reference", unit="step"):
         time = (step + 1) * dt
-        place = -config.passage.approach + config.passage.speed * time + poles.x
+        place = nose(config, time) + poles.x
         bump, ramp = poles.irregularity(place)
         rail, rail_slope = poles.rail(place, model)
         reached = place.max() >= 0  # until then the guideway rests
