@@ -767,7 +767,7 @@ class Passage(Parameters):
         confidence="H",
         above=0,
     )
-    time_step: float = quantity("s", "Δt", "0.55 ms", source="D", confidence="M", above=0)
+    time_step: float = quantity("s", "Δt", "0.54 ms", source="D", confidence="M", above=0)
     mode_cutoff: float = quantity(
         "Hz",
         "highest mode of the middle span, where responses are taken, in the production solver; "

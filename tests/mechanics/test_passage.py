@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev.mechanics import guideway, integrate, irregularity, reduction, responses
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import n_steps, time_step, track_range
+from maglev.mechanics.course import n_steps, nose, time_step, track_range
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
 
@@ -203,7 +203,7 @@ def closed_linearly(config, duration, step):
             damper = force * k_d[guides] / kind.current_reference
             stiffness += spring * np.outer(at, at)
             damping += damper * np.outer(at, at)
-            place = -config.passage.approach + magnets.x[m] + dx + config.passage.speed * time
+            place = nose(config, time) + magnets.x[m] + dx
             value, slope = irregularity.displacement(track, place)
             push += np.outer(spring * value[row] + damper * config.passage.speed * slope[row], at)
     per_mass = np.diag(1 / train.mass)

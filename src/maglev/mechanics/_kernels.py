@@ -710,7 +710,7 @@ def passage(
         if stage >= 0:
             _line_acceleration(line, stage, line_x, line_rate, line_acceleration)
         row = step // run.record_every - 1 if record else 0
-        # girder accelerations come a step late
+        # girder accelerations come a step late, and the last of all is that of the step before
         late = run.record_every > 0 and step > run.record_every
         late = late and (step - 1) % run.record_every == 0
         row_before = (step - 1) // run.record_every - 1 if late else 0
@@ -744,6 +744,7 @@ def passage(
             _keep_peak(outcome, recent, 2 + direction, smooth, time - dt, dt)
             if record:
                 store(outcome.history[row], direction, shift)
+                store(outcome.history[row], 2 + direction, smooth)
             if late:
                 store(outcome.history[row_before], 2 + direction, smooth)
         for car in range(n_cars):

@@ -110,9 +110,9 @@ def top_stiffness(reduced: ReducedGuideway) -> sp.csr_array:
     return _without_noise(dense)
 
 
-def pruned_mass(reduced: ReducedGuideway) -> sp.csr_array:
-    """Mass matrix of the pier tops (top, top) without what rounding leaves."""
-    return _without_noise(reduced.top_mass)
+def top_mass(reduced: ReducedGuideway, time_step: float) -> sp.csr_array:
+    """Mass of the pier tops (top, top) in a step of Δt [s] when all modes are stepped."""
+    return _without_noise(reduced.top_mass) + time_step**2 / 12 * top_stiffness(reduced)
 
 
 def _without_noise(matrix: Array) -> sp.csr_array:
@@ -120,10 +120,13 @@ def _without_noise(matrix: Array) -> sp.csr_array:
     return sp.csr_array(np.where(np.abs(matrix) > 1e-10 * np.outer(scale, scale), matrix, 0.0))
 
 
-def stepped_mass(reduced: ReducedGuideway, stepped: BoolArray) -> tuple[IntArray, Array]:
-    """Pier tops that are stepped, and the lower Cholesky factor of their mass.
+def stepped_mass(
+    reduced: ReducedGuideway, stepped: BoolArray, time_step: float
+) -> tuple[IntArray, Array]:
+    """Pier tops that are stepped, and the lower Cholesky factor of their mass in a step.
 
-    Modes that are not stepped follow the tops with their mass.
+    Modes that are not stepped follow the tops with their mass.  A share Δt²/12 of the stiffness
+    does for the tops what its response does for a mode: swings of their own keep their period.
 
     Parameters
     ----------
@@ -131,6 +134,8 @@ def stepped_mass(reduced: ReducedGuideway, stepped: BoolArray) -> tuple[IntArray
         Guideway in component coordinates.
     stepped : (coordinate,)
         Whether a coordinate is stepped.
+    time_step
+        Δt [s].
 
     Returns
     -------
@@ -138,10 +143,14 @@ def stepped_mass(reduced: ReducedGuideway, stepped: BoolArray) -> tuple[IntArray
         Coordinates, those that meet next to each other.
     factor : (stepped top, stepped top)
         Lower triangular.
+
+    References
+    ----------
+    docs/theory/integration.md, eq. 4.
     """
     n = reduced.n_modes
     follows = reduced.carried[np.flatnonzero(~stepped[:n])]
-    mass = (pruned_mass(reduced) + follows.T @ follows).tocsr()
+    mass = top_mass(reduced, time_step) + (follows.T @ follows).tocsr()
     tops = np.flatnonzero(stepped[n:])
     _, label = connected_components(mass[tops][:, tops], directed=False)
     tops = tops[np.argsort(label, kind="stable")]
