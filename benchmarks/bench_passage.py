@@ -43,8 +43,8 @@ from maglev.mechanics._kernels import (
     _magnets,
     _move_rails,
 )
-from maglev.mechanics.course import n_steps, time_step
-from maglev.mechanics.lanes import LANES
+from maglev.mechanics.course import first_step, n_steps, nose, start, time_step
+from maglev.mechanics.lanes import LANES, zeros
 from maglev.parameters import Config
 from maglev.simulation import _system, track
 from maglev.stages import config_slice
@@ -208,20 +208,21 @@ class Phase:
 
 def noses(system: integrate.System) -> Array:
     """Place of the nose at every step (step,) [m]."""
-    config = system.config
-    advance = config.passage.speed * time_step(config)
-    return -config.passage.approach + advance * np.arange(1, n_steps(config) + 1)
+    steps = np.arange(1, n_steps(system.config) + 1)
+    return nose(system.config, steps * time_step(system.config))
 
 
 def rail_under_train(system: integrate.System) -> Array:
     """Share (span,) of a span's rail that a mean step moves: its units under the train [-]."""
-    line, nose = system.line, noses(system)
+    line, place = system.line, noses(system)
     unit = line.span_length / line.n_units
     shares = []
     for span in range(line.n_spans):
-        tail = nose - system.config.train.length - span * line.span_length
+        tail = place - system.config.train.length - span * line.span_length
         begin = np.clip(np.floor(tail / unit - 1e-6), 0, line.n_units)
-        end = np.clip(np.floor((nose - span * line.span_length) / unit + 1e-6) + 1, 0, line.n_units)
+        end = np.clip(
+            np.floor((place - span * line.span_length) / unit + 1e-6) + 1, 0, line.n_units
+        )
         shares.append(np.maximum(end - begin, 0).mean() / line.n_units)
     return np.array(shares)
 
@@ -256,6 +257,7 @@ def operations(system: integrate.System) -> dict[str, float]:
     # links: what they hang on 3, fused; stretch 2m - 1 and force back 2m for m coefficients
     links = 3 * vehicle.scaled_dof.size + 4 * vehicle.link_coefficient.size
     links -= vehicle.link_start.size - 1
+    moving = 1 - (first_step(system.config) - 1) / n_steps(system.config)  # the train rests before
     # poles: gap error 3, its rate 3, gap 1, current 4, pull 3, force and moment 3, means 2;
     # a magnet: signs 4, force and moment on the train 6, means 2
     n_poles, n_on = poles_on_guideway(system)
@@ -281,23 +283,23 @@ def operations(system: integrate.System) -> dict[str, float]:
         damping = (line.damping_to[each] - line.damping_from[each]).sum()
         between = np.diff(line.stiffness_start)[line.stepped[tops:stop] - line.square.size].sum()
         factor = line.factor_start[stop] - line.factor_start[tops]
-        coefficients = 2 * carried + taken + modes.size + between + damping + 2 * factor
-        guideway += share * (2 * coefficients + (stop - start) + modes.size + 2 * (stop - tops))
-        line_states += share * 10 * (stop - start)
-    # states: x 4, predicted 2, half kicks 2 and 2, fused; the train's forces over its masses 1
-    states = 11 * n_dof + line_states
+        coefficients = carried + taken + modes.size + between + damping + 2 * factor
+        guideway += share * (2 * coefficients + (stop - start) + 2 * modes.size + 2 * (stop - tops))
+        line_states += share * 8 * (stop - start)
+    # states: x 2, velocity 2, predicted 4, fused; the train's forces over its masses 1
+    states = 9 * n_dof * moving + line_states
     # outputs: midspan z and y 4 a column, each section of the low-pass 9, peak of a response 9
     n_sections = integrate._run(system.config, 0).sections.shape[0]
     outputs = 2 * (4 * line.output_column.size + 9 * n_sections)
     outputs += 9 * (4 + 2 * vehicle.body_z.size)
     return {
-        "train links": links,
-        "poles: gap, current, force": poles,
+        "train links": links * moving,
+        "poles: gap, current, force": poles * moving,
         "poles: rail under them and force back": under_poles,
         "rails: from modes and back": rails,
         "guideway: stiffness, damping, pier tops": guideway,
         "states: predict and kick": states,
-        "outputs": outputs,
+        "outputs": outputs * moving,
     }
 
 
@@ -308,23 +310,21 @@ def _repeat_links(n, vehicle, x, velocity, scaled, pull, force):
 
 
 @njit
-def _repeat_train(n, vehicle, dt, x, velocity, predicted, force):
+def _repeat_train(n, vehicle, dt, x, velocity, before, predicted, force):
     for _ in range(n):
-        _advance_train(vehicle, 0.5 * dt, dt, 0.5 * dt * dt, x, velocity, predicted, force)
+        _advance_train(vehicle, dt, x, velocity, before, predicted, force)
 
 
 @njit
-def _repeat_line(n, line, stage, relative, rate, force):
+def _repeat_line(n, line, stage, x, velocity, force):
     for _ in range(n):
-        _line_acceleration(line, stage, relative, rate, force)
+        _line_acceleration(line, stage, x, velocity, force)
 
 
 @njit
-def _repeat_advance(n, line, stage, dt, x, velocity, acceleration, relative, rate):
+def _repeat_advance(n, line, stage, dt, x, velocity, before, acceleration, rate):
     for _ in range(n):
-        _advance_line(
-            line, stage, 0.5 * dt, dt, 0.5 * dt * dt, x, velocity, acceleration, relative, rate
-        )
+        _advance_line(line, stage, dt, x, velocity, before, acceleration, rate)
 
 
 @njit
@@ -337,8 +337,10 @@ def _repeat_rails(n, line, span, x, velocity, motion, rate, pull, turn, packed, 
 
 
 @njit
-def _every_step(stride, n, places, rows, gains, x, v, force, motion, rate, pull, outcome, magnet):
-    for step in range(1, n + 1, stride):
+def _every_step(
+    stride, first, last, places, rows, gains, x, v, force, motion, rate, pull, outcome, magnet
+):
+    for step in range(first, last + 1, stride):
         _magnets(
             places, rows, step, gains, x, v, force, motion, rate, pull, False, outcome,
             magnet[0], magnet[1], magnet[2], magnet[3],
@@ -355,15 +357,21 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     line, rng = system.line, np.random.default_rng(3)
     vehicle, dt = system.vehicle, time_step(system.config)
     n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
-    x, v, predicted = 1e-5 * rng.standard_normal((3, n_dof, LANES))
-    line_x, line_v = 1e-5 * rng.standard_normal((2, n_line, LANES))
-    force, at_rest = np.zeros((2, n_dof, LANES))
-    line_force, relative, its_rate = np.zeros((3, n_line, LANES))
-    scaled = np.zeros((vehicle.scaled_dof.size, LANES))
-    link_pull = np.zeros((vehicle.link_start.size - 1, LANES))
-    motion, rate, pull = 1e-5 * rng.standard_normal((3, 3, line.n_spans * line.stride, LANES))
-    turn = np.zeros((line.stride, LANES))
-    packed = np.zeros((line.upright.size + line.sideways.size, LANES))
+    n_rail = line.n_spans * line.stride
+
+    def rows(n: int, size: float) -> Array:
+        """Rows of samples of about a size, where the kernels have theirs."""
+        filled = zeros(n)
+        filled[:] = size * rng.standard_normal((n, LANES))
+        return filled
+
+    x, v, force = rows(n_dof, 1e-5), rows(n_dof, 1e-5), zeros(n_dof)
+    resting = [zeros(n_dof) for _ in range(5)]
+    scaled, link_pull = zeros(vehicle.scaled_dof.size), zeros(vehicle.link_start.size - 1)
+    line_x, line_v, line_force = rows(n_line, 1e-5), rows(n_line, 1e-5), zeros(n_line)
+    line_resting = [zeros(n_line) for _ in range(5)]
+    motion, rate, pull = (rows(3 * n_rail, 1e-5).reshape((3, n_rail, LANES)) for _ in range(3))
+    turn, packed = zeros(line.stride), zeros(line.upright.size + line.sideways.size)
     magnet = np.zeros((4, system.train.magnets.x.size, LANES))
     run = integrate._run(system.config, 0)
     outcome = integrate._empty_outcome(system, run)
@@ -373,18 +381,18 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
         function(1)  # compiles
         return timed(lambda: function(n), 3).process / n / LANES
 
-    links = per_call(2000, lambda n: _repeat_links(n, vehicle, x, v, scaled, link_pull, force))
-    states = per_call(2000, lambda n: _repeat_train(n, vehicle, dt, x, v * 0, predicted, at_rest))
+    moving = 1 - (run.first_step - 1) / run.n_steps
+    links = moving * per_call(
+        2000, lambda n: _repeat_links(n, vehicle, x, v, scaled, link_pull, force)
+    )
+    states = moving * per_call(2000, lambda n: _repeat_train(n, vehicle, dt, *resting))
     guideway = 0.0
-    for stage, share in enumerate(steps_of_stages(system) / n_steps(system.config)):
+    for stage, share in enumerate(steps_of_stages(system) / run.n_steps):
         guideway += share * per_call(
             500, lambda n, at=stage: _repeat_line(n, line, at, line_x, line_v, line_force)
         )
         states += share * per_call(
-            500,
-            lambda n, at=stage: _repeat_advance(
-                n, line, at, dt, line_x * 0, line_v * 0, line_force * 0, relative, its_rate
-            ),
+            500, lambda n, at=stage: _repeat_advance(n, line, at, dt, *line_resting)
         )
     shares = rail_under_train(system)
     rails = sum(
@@ -405,12 +413,14 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     ):
 
         def calls(n: int, rows=rows, places=places) -> None:
-            last = run.n_steps if n > 1 else 1
+            last = run.n_steps if n > 1 else run.first_step
             _every_step(
-                every, last, places, rows, gains, x, v, force, motion, rate, pull, outcome, magnet
+                every, run.first_step, last, places, rows, gains, x, v, force, motion, rate, pull,
+                outcome, magnet,
             )  # fmt: skip
 
-        poles += per_call(-(-run.n_steps // every), calls)
+        steps = run.n_steps + 1 - run.first_step
+        poles += moving * per_call(-(-steps // every), calls)
     rest = per_step - links - guideway - rails - poles - states
     law, under, counted_states = (
         counted.pop(name)
@@ -440,7 +450,7 @@ def step_bytes(system: integrate.System) -> tuple[int, int]:
     """Bytes that a row of samples goes through in a step: states, and matrices they share."""
     line, vehicle = system.line, system.vehicle
     n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
-    rows = 4 * n_dof + vehicle.scaled_dof.size + vehicle.link_start.size - 1
+    rows = 5 * n_dof + vehicle.scaled_dof.size + vehicle.link_start.size - 1
     rows += 5 * n_line + 9 * line.n_spans * line.stride
     shared = [*line, *vehicle]
     tables = sum(array.nbytes for array in shared if isinstance(array, np.ndarray))
@@ -512,7 +522,7 @@ def reference_time(config: Config, seconds: float) -> Reference:
     """
     resting, _ = step_time(config, seconds / 2)
     running, steps = step_time(with_part(config, "passage", approach=1e-3), seconds)
-    before = int(config.passage.approach / config.passage.speed / time_step(config))
+    before = int(-start(config) / config.passage.speed / time_step(config))
     whole = resting * before + running * (n_steps(config) - before)
     return Reference(resting, running, steps, whole)
 

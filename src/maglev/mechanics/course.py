@@ -10,9 +10,8 @@ import numpy.typing as npt
 from maglev.parameters import Config, Magnet
 
 JOINT_SHARE = 0.5
-"""Share of a step that poles have left to go to a joint of the rails at the last step before it [-].
-The force of a pole jumps at a joint, at a cost in accuracy that is linear in the share: measured
-least here at 430 and 200 km/h with steps of 0.24 to 0.54 ms (docs/theory/integration.md)."""
+"""Where in a step poles meet the joints of the rails [-].  Their force jumps there, which costs an
+error of first order unless it falls half-way between two steps (docs/theory/integration.md)."""
 
 
 def time_step(config: Config) -> float:

@@ -125,7 +125,7 @@ def acceleration_filter(passage: Passage, time_step: float) -> Array:
 
     References
     ----------
-    docs/theory/integration.md, eq. 7.
+    docs/theory/integration.md, eq. 8.
     """
     band = passage.acceleration_band
     if band is None:
