@@ -137,11 +137,11 @@ def lateral_sizes():
 @pytest.mark.parametrize(("speed", "track"), STORED)
 def test_displacements_and_car_bodies_are_those_of_the_reference_solver(speed, track):
     found, stored = against_stored(speed, track)
-    assert_allclose(found.girder[:, 0], stored["girder"][:, 0], rtol=5e-3)
-    assert_allclose(found.body_z.max(axis=1), stored["car_body_z"].max(axis=1), rtol=5e-3)
+    assert_allclose(found.girder[:, 0], stored["girder"][:, 0], rtol=2e-3)
+    assert_allclose(found.body_z.max(axis=1), stored["car_body_z"].max(axis=1), rtol=2e-3)
     if track == "irregular":
-        assert_allclose(found.girder[:, 1], stored["girder"][:, 1], rtol=5e-3)
-        assert_allclose(found.body_y.max(axis=1), stored["car_body_y"].max(axis=1), rtol=5e-3)
+        assert_allclose(found.girder[:, 1], stored["girder"][:, 1], rtol=2e-3)
+        assert_allclose(found.body_y.max(axis=1), stored["car_body_y"].max(axis=1), rtol=2e-3)
 
 
 @pytest.mark.parametrize(("speed", "track"), STORED)
@@ -156,11 +156,11 @@ def test_girder_accelerations_are_those_of_the_reference_solver(speed, track):
 def test_gaps_and_currents_are_those_of_the_reference_solver(speed, track):
     found, stored = against_stored(speed, track)
     for name in ("gap_min", "gap_max"):
-        assert_allclose(getattr(found, name), stored[name], rtol=5e-3, err_msg=name)
-    # On smooth track it is decided at the joints, where single poles feel modes beyond the cut-off;
-    # the reference solver's own values move by 0.2 % with where in a step poles meet the joints.
+        assert_allclose(getattr(found, name), stored[name], rtol=1e-3, err_msg=name)
+    # On smooth track they are decided at the joints, where single poles feel modes beyond the
+    # cut-off, and the reference solver's own move by 0.4 % with where in a step poles meet a joint.
     suspension, guidance = found.current_max.T
-    rtol = (6e-3, 7e-3) if track == "smooth" else (5e-3, 5e-3)
+    rtol = (6e-3, 1e-2) if track == "smooth" else (1e-3, 1e-3)
     assert_allclose(suspension, stored["current_max"][:, 0], rtol=rtol[0])
     assert_allclose(guidance, stored["current_max"][:, 1], rtol=rtol[1])
 

@@ -564,6 +564,14 @@ def _covered(line, span, tail, nose):
 
 
 @njit(cache=True, error_model="numpy")
+def _keep_extreme(outcome, place, value, time):
+    size = maximum(value, -1.0 * value)
+    best = load(outcome.extreme, place)
+    store(outcome.extreme_time, place, choose(size, best, time, load(outcome.extreme_time, place)))
+    store(outcome.extreme, place, maximum(size, best))
+
+
+@njit(cache=True, error_model="numpy")
 def _keep_peak(outcome, recent, place, value, time, dt):
     """Keep the size of a motion's largest peak, and when it was.
 
@@ -575,12 +583,10 @@ def _keep_peak(outcome, recent, place, value, time, dt):
     # twice the way back from the middle to the vertex [steps]; beyond 1 another value is nearer
     back = rise / (value - middle - middle + before)
     back = choose(1.0, maximum(back, -1.0 * back), back, 0.0)
-    peak = fma(rise * back, -0.125, middle)
-    size = maximum(peak, -1.0 * peak)
-    best = load(outcome.extreme, place)
-    when = fma(back, -0.5 * dt, time - dt + back * 0.0)
-    store(outcome.extreme_time, place, choose(size, best, when, load(outcome.extreme_time, place)))
-    store(outcome.extreme, place, maximum(size, best))
+    _keep_extreme(
+        outcome, place, fma(rise * back, -0.125, middle), back * (-0.5 * dt) + (time - dt)
+    )
+    _keep_extreme(outcome, place, value, time)  # the last of all has none behind it
     store(recent, 2 * place, middle)
     store(recent, 2 * place + 1, value)
 
