@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.ticker import FuncFormatter, LogLocator
 from numba import njit
-from threadpoolctl import threadpool_limits
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from maglev import datasets, load_config, simulate
 from maglev.figures import style
@@ -42,9 +42,10 @@ from maglev.mechanics._kernels import (
     _load_line,
     _magnets,
     _move_rails,
+    zeros,
 )
 from maglev.mechanics.course import first_step, n_steps, nose, start, time_step
-from maglev.mechanics.lanes import LANES, zeros
+from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
 from maglev.simulation import _system, track
 from maglev.stages import config_slice
@@ -188,6 +189,12 @@ def processor() -> str:
         wide = "AVX-512" if "avx512f" in lines.get("flags", "") else "AVX2"
         clock += f", {wide}" if "avx2" in lines.get("flags", "") else ""
     return f"{name}{clock}, {os.cpu_count()} cores"
+
+
+def linear_algebra() -> str:
+    """The library of linear algebra and the processor that its kernels are made for."""
+    names = {f"{one['internal_api']}, {one.get('architecture', '?')}" for one in threadpool_info()}
+    return " and ".join(sorted(name for name in names if "blas" in name or "mkl" in name))
 
 
 # ---------------------------------------------------------------- operations by phase
@@ -860,8 +867,9 @@ def page(results: Results, sizes: Sizes) -> str:
         "## The machine's ceiling",
         "",
         f"One core: {results.ceiling.flops / 1e9:.1f} GFLOP/s in the product of two matrices of "
-        f"{sizes.matrix} × {sizes.matrix} doubles; {results.ceiling.bytes / 1e9:.1f} GB/s, read "
-        f"and written together, in a copy of {sizes.copied * 8 / 2**20:.0f} MiB.",
+        f"{sizes.matrix} × {sizes.matrix} doubles ({linear_algebra()}); "
+        f"{results.ceiling.bytes / 1e9:.1f} GB/s, read and written together, in a copy of "
+        f"{sizes.copied * 8 / 2**20:.0f} MiB.",
         "",
         "## Operations of a step",
         "",

@@ -892,7 +892,7 @@ class MonteCarlo(Parameters):
     """The baseline: independent random gains, one run each."""
 
     n_samples: int = _count(10_000, "number of runs, unless the case says another", minimum=2)
-    chunk_size: int = _count(500, "runs in one file and job; no number depends on it")
+    chunk_size: int = _count(1000, "runs in one file and job; no number depends on it")
 
 
 class OneStage(Parameters):

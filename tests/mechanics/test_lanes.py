@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import types
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,9 +13,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from maglev.mechanics import integrate, irregularity
+from maglev.mechanics import _kernels, integrate, irregularity
 from maglev.mechanics.course import n_steps, track_range
-from maglev.mechanics.lanes import LANES, choose, fma, load, maximum, minimum, store
+from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, minimum, store
 from maglev.parameters import Config
 
 RNG = np.random.default_rng(7)
@@ -113,6 +114,100 @@ def test_rows_are_read_and_written_where_they_lie():
     assert_array_equal(target[1, 2:], A)
     target[1, 2:] = 0.0
     assert not target.any()
+
+
+def test_an_entry_is_that_of_the_array_as_it_lies():
+    table = RNG.normal(size=(3, 5))
+
+    @numba.njit
+    def read(array, places, out):
+        for k in range(places.size):
+            out[k] = entry(array, places[k])
+
+    places, out = np.array([0, 4, 7, 14]), np.zeros(4)
+    read(table, places, out)
+    assert_array_equal(out, table.ravel()[places])
+    if not numba.config.DISABLE_JIT:
+        with pytest.raises(numba.core.errors.TypingError, match="entry needs an array in C order"):
+            read(np.asfortranarray(table), places, out)
+
+
+@pytest.mark.parametrize("n_rows", [1, 7, 64])
+def test_rows_of_the_kernels_begin_where_a_cache_line_does(n_rows):
+    rows = _kernels.zeros(n_rows)
+    assert rows.shape == (n_rows, LANES)
+    assert not rows.any()
+    assert rows.ctypes.data % 64 == 0
+
+
+def with_rows_at_once(function, wide):
+    """A kernel compiled for a processor with many registers or with few."""
+    plain = function.py_func
+    given = plain.__globals__ | {"WIDE": wide}
+    copy = types.FunctionType(plain.__code__, given, plain.__name__, plain.__defaults__)
+    return numba.njit(error_model="numpy")(copy)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="about compiled kernels")
+def test_how_many_rows_are_taken_at_once_changes_no_bit():
+    n, width = 7, 18
+    matrix, other = RNG.normal(size=(2, n, width))
+    packed = RNG.normal(size=(2 * n, LANES))
+    columns = RNG.permutation(2 * n)[:n]
+    results = []
+    for wide in (False, True):
+        out = np.zeros((4, width, LANES))
+        with_rows_at_once(_kernels._transform, wide)(matrix, 0, n, packed, 2, 0, width, out[0], 0)
+        with_rows_at_once(_kernels._transform_both, wide)(
+            matrix, 0, n, other, 1, n, packed, 2, width, out[1], out[2], 0
+        )
+        target = np.ones((2 * n, LANES))
+        with_rows_at_once(_kernels._project, wide)(
+            matrix, columns, 0, n, 3, width, out[0], 0, target
+        )
+        results.append((out, target))
+    assert_array_equal(results[0][0], results[1][0])
+    assert_array_equal(results[0][1], results[1][1])
+    (out, target), motion = results[0], matrix.T @ packed[2 : 2 + n]
+    assert_allclose(out[0], motion, rtol=0, atol=1e-12)
+    mean, turn = matrix.T @ packed[:n], other[1:].T @ packed[n : 2 * n - 1]
+    assert_allclose(out[1, 2:], (mean + turn)[2:], rtol=0, atol=1e-12)
+    assert_allclose(out[2, 2:], (mean - turn)[2:], rtol=0, atol=1e-12)
+    expected = np.ones((2 * n, LANES))
+    expected[columns] += matrix[:, 3:] @ motion[3:]
+    assert_allclose(target, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("frequency", [20.0, 100.0])
+def test_a_peak_between_two_steps_is_kept_with_its_time(frequency):
+    dt = 0.54e-3
+    crest = 40.3 * dt + np.arange(LANES) * dt / LANES  # one for every share of a step
+    config = Config()
+    profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
+    system = integrate.prepare(config, profile)
+    outcome = integrate._empty_outcome(system, integrate._run(config, 0))
+
+    def motion(step):
+        ahead = step * dt - crest
+        return -np.cos(2 * np.pi * frequency * ahead) * np.exp(-((ahead / 0.02) ** 2))
+
+    recent, largest = _kernels.zeros(2), np.zeros(LANES)
+    recent[:] = motion(-1), motion(0)
+    for step in range(1, 81):
+        largest = np.maximum(largest, np.abs(motion(step)))
+        row = _kernels.zeros(1)
+        row[0] = motion(step)
+        keep_peak(outcome, recent, row, step * dt, dt)
+    error = np.abs(outcome.extreme[0] - 1.0)
+    assert error.max() < 0.03 * (1 - largest).max() + 2e-6
+    period = 1 / frequency
+    late = (outcome.extreme_time[0] - crest + period / 4) % (period / 2) - period / 4
+    assert np.abs(late).max() < 0.02 * dt
+
+
+@numba.njit
+def keep_peak(outcome, recent, row, time, dt):
+    _kernels._keep_peak(outcome, recent, 0, load(row, 0), time, dt)
 
 
 SHORT = {

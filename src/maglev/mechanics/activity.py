@@ -27,7 +27,7 @@ QUIET_CUTOFF = 100.0
 """Highest mode of quiet spans and their piers that is stepped [Hz]; assumed, checked in
 docs/convergence.md."""
 
-AWAKE_BESIDE = 2
+AWAKE_BESIDE = 3
 """Spans ahead of the train, and behind it, that are awake [-]; assumed, checked likewise."""
 
 

@@ -676,21 +676,28 @@ def _run(config: Config, record_every: int) -> Run:
 
 
 def _empty_outcome(system: System, run: Run) -> Outcome:
+    """Room for what a row of samples leaves behind, as for a train at rest."""
     n_cars = system.vehicle.body_z.size
-    n_magnets = system.train.magnets.x.size
+    table = system.train.magnets
+    n_magnets = table.x.size
     n_records = run.n_steps // run.record_every if run.record_every else 0
     kinds = (system.suspension, system.guidance)
-    rest = np.array([[k.gap_reference] * LANES for k in kinds])
+    gap = np.array([[k.gap_reference] * LANES for k in kinds])
+    current = np.array([[k.current_reference] * LANES for k in kinds])
+    history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets, LANES))
+    of_kind = table.is_guidance.astype(np.int64)
+    history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]
+    history[:, -n_magnets:] = current[of_kind]
     return Outcome(
         extreme=np.zeros((4 + 2 * n_cars, LANES)),
         extreme_time=np.zeros((4 + 2 * n_cars, LANES)),
-        gap_min=rest.copy(),
-        gap_max=rest.copy(),
-        current_max=np.array([[k.current_reference] * LANES for k in kinds]),
+        gap_min=gap.copy(),
+        gap_max=gap.copy(),
+        current_max=current,
         status=np.zeros(LANES, np.int64),
         lost_time=np.full(LANES, np.nan),
         lost_magnet=np.full(LANES, -1, np.int64),
-        history=np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets, LANES)),
+        history=history,
     )
 
 

@@ -27,9 +27,6 @@ from numba.extending import intrinsic, lower_builtin, models, register_model, ty
 LANES = 16
 """Samples side by side [-]: two AVX-512 or four AVX2 registers of doubles."""
 
-_LINE = 8
-"""Doubles in a line of the processor's cache [-]."""
-
 WIDE = bool(binding.get_host_cpu_features().get("avx512f", False))
 """Whether the processor has 32 registers for rows, not 16: kernels then take more rows at once."""
 
@@ -201,17 +198,6 @@ def _maximum_python(a: Any, b: Any) -> Any:
 
 def _choose_python(a: Any, b: Any, x: Any, y: Any) -> Any:
     return np.where(np.greater(a, b), x, y)
-
-
-@numba.njit(cache=True)
-def zeros(n_rows: int) -> np.ndarray:
-    """Rows of zeros ``(n_rows, LANES)`` that begin where a line of the processor's cache does.
-
-    Elsewhere each register of a row is read from two lines, at twice the cost.
-    """
-    whole = np.zeros(n_rows * LANES + _LINE)
-    start = -(whole.ctypes.data // 8) % _LINE
-    return whole[start : start + n_rows * LANES].reshape((n_rows, LANES))
 
 
 if numba.config.DISABLE_JIT:

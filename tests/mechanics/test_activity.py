@@ -1,0 +1,162 @@
+"""Which coordinates of the guideway are stepped when, and what it costs to leave some alone."""
+
+from functools import lru_cache
+from unittest import mock
+
+import numpy as np
+import pytest
+import scipy.linalg
+from numpy.testing import assert_allclose, assert_array_equal
+
+from maglev.mechanics import activity, course, guideway, integrate, irregularity, reduction
+from maglev.mechanics.course import first_step, n_steps, nose, start, time_step, track_range
+from maglev.parameters import Config
+
+LINE = Config.model_validate({"train": {"n_cars": 1}, "guideway": {"n_spans": 12}})
+"""One car on twelve spans: most of the line has no train."""
+
+
+@lru_cache
+def reduced_line():
+    passage = LINE.passage
+    return reduction.reduce(
+        guideway.build(LINE.guideway), passage.mode_cutoff, passage.mode_cutoff_elsewhere
+    )
+
+
+@lru_cache
+def stages():
+    return activity.stages(LINE, reduced_line())
+
+
+def passed(**constants):
+    """Extremes of eight samples, with other constants of the activity."""
+    profile = irregularity.profile(LINE.irregularity, track_range(LINE), LINE.seed)
+    spread = 1 + 0.1 * np.random.default_rng(4).standard_normal((8, 4))
+    usual = {"QUIET_CUTOFF": activity.QUIET_CUTOFF, "AWAKE_BESIDE": activity.AWAKE_BESIDE}
+    with mock.patch.multiple(activity, **(usual | constants)):
+        system = integrate.prepare(LINE, profile)
+        found = integrate.integrate(system, np.array(LINE.gains.as_row) * spread)
+    assert not found.status.any()
+    return np.column_stack([found.girder, found.body_z, found.body_y, found.gap_min, found.gap_max])
+
+
+def test_quiet_spans_cost_no_accuracy():
+    everywhere = passed(AWAKE_BESIDE=LINE.guideway.n_spans)
+    quiet = passed()
+    assert np.abs(quiet / everywhere - 1).max() < 3e-3
+    assert np.any(quiet != everywhere)
+
+
+def test_the_lower_the_modes_that_quiet_spans_keep_the_larger_the_error():
+    everywhere = passed(AWAKE_BESIDE=LINE.guideway.n_spans)
+    errors = [
+        np.abs(passed(QUIET_CUTOFF=cutoff) / everywhere - 1).max() for cutoff in (20.0, 100.0)
+    ]
+    assert errors[1] < 0.2 * errors[0]
+
+
+def test_spans_under_the_train_and_beside_it_are_awake_and_so_is_the_middle_one():
+    length, n_spans = LINE.guideway.span_length, LINE.guideway.n_spans
+    starts = [stage.first_step for stage in stages()] + [n_steps(LINE) + 1]
+    assert np.all(np.diff(starts) > 0)
+    for stage, begin, end in zip(stages(), starts, starts[1:], strict=False):
+        places = nose(LINE, np.array([begin, end - 1]) * time_step(LINE))
+        tail = int(np.floor((places[0] - LINE.train.length) / length))
+        head = int(np.floor(places[1] / length))
+        reach = range(tail - activity.AWAKE_BESIDE, head + activity.AWAKE_BESIDE + 1)
+        for span in {*reach, n_spans // 2} & set(range(n_spans)):
+            assert stage.awake[reduced_line().span_coordinates[span]].all()
+        assert stage.stepped[stage.awake].all()
+        assert stage.stepped[reduced_line().n_modes :].all()  # pier tops pass motion on
+
+
+def test_most_of_a_long_line_is_not_stepped():
+    share = np.mean([stage.stepped.mean() for stage in stages()])
+    assert share < 0.8
+    # Each stage steps as much as the next, whatever the spans beyond: nothing but ends differ.
+    counts = [stage.awake.sum() for stage in stages()[4:-6]]
+    assert max(counts) - min(counts) < 0.2 * np.mean(counts)
+
+
+def test_the_guideway_rests_until_the_nose_reaches_it():
+    first = stages()[0].first_step
+    assert nose(LINE, first * time_step(LINE)) >= 0 > nose(LINE, (first - 1) * time_step(LINE))
+
+
+def test_tops_that_modes_follow_have_their_mass():
+    """With no mode stepped the tops carry the whole line, as in the finite elements."""
+    reduced = reduced_line()
+    stepped = np.arange(reduced.n_coordinates) >= reduced.n_modes
+    tops, factor = activity.stepped_mass(reduced, stepped, 0.0)
+    carried = reduced.carried.toarray()
+    expected = reduced.top_mass + carried.T @ carried
+    at = tops - reduced.n_modes
+    assert_allclose(factor @ factor.T, expected[np.ix_(at, at)], atol=1e-9 * expected.max())
+    # A shift sideways moves all mass above the piers, and of the piers less than all.
+    sideways = np.zeros(expected.shape[0])
+    sideways[1::6] = 1.0
+    model = guideway.build(LINE.guideway)
+    everything = (model.component == 1).astype(float)
+    above = everything.copy()
+    above[np.concatenate(model.pier_dof)] = 0.0
+    mass = sideways @ expected @ sideways
+    assert above @ model.mass @ above < mass < everything @ model.mass @ everything
+
+
+@pytest.mark.parametrize("step", [0.27e-3, 0.54e-3])
+def test_what_is_stepped_keeps_the_periods_of_the_guideway(step):
+    """Of fourth order in the step: all modes in the band within 3e-4 at 0.54 ms."""
+    reduced = reduced_line()
+    exact = np.sqrt(scipy.linalg.eigvalsh(reduced.stiffness.toarray(), reduced.mass.toarray()))
+    squares = scipy.linalg.eigvalsh(
+        integrate.stepped_stiffness(reduced), integrate.stepped_inertia(reduced, step)
+    )
+    found = 2 / step * np.arcsin(step / 2 * np.sqrt(squares))
+    band = exact < 2 * np.pi * 100.0
+    assert band.sum() > 100
+    assert np.abs(found / exact - 1)[band].max() < 3e-4 * (step / 0.54e-3) ** 4
+
+
+def test_poles_meet_the_joints_half_way_between_steps():
+    for speed in ("430 km/h", "217 km/h"):
+        config = Config.model_validate({"passage": {"speed": speed}})
+        advance = config.passage.speed * time_step(config)
+        assert -config.passage.approach - advance < start(config) <= -config.passage.approach
+        system = integrate.prepare(
+            config, irregularity.profile(config.irregularity, track_range(config), config.seed)
+        )
+        for ground in system.grounds:
+            joint = np.abs(ground.x % 3.096)
+            assert_allclose(np.minimum(joint, 3.096 - joint).min(), advance / 2, rtol=1e-6)
+
+
+def test_the_train_rests_until_it_meets_the_track():
+    """Leaving out the steps before changes nothing but what rounding does to a train at rest."""
+    config = Config.model_validate(
+        {
+            "train": {"n_cars": 1},
+            "guideway": {"n_spans": 1},
+            "irregularity": {"fade_in": "10 m"},
+            "passage": {"approach": "40 m"},
+        }
+    )
+    profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
+    gains = np.array([config.gains.as_row])
+    found = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
+    with mock.patch.object(integrate, "first_step", lambda _: 1):
+        whole = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
+    first = first_step(config)
+    assert nose(config, (first + 1) * time_step(config)) > -10.0
+    assert nose(config, (first - 1) * time_step(config)) <= -10.0
+    for name in ("girder", "body_z", "body_y", "gap_min", "gap_max", "current_max"):
+        assert_allclose(getattr(found, name), getattr(whole, name), rtol=1e-9, err_msg=name)
+    assert_allclose(found.gap_history, whole.gap_history, rtol=0, atol=1e-12)
+    assert_allclose(found.current_history, whole.current_history, rtol=0, atol=1e-9)
+    assert_array_equal(found.time, whole.time)
+
+
+def test_an_even_number_of_steps_goes_into_the_pole_passing_where_kinds_stand_half_a_pitch_apart():
+    period = 0.258 / (430 / 3.6)
+    odd = Config.model_validate({"passage": {"time_step": f"{period / 5 * 1.001} s"}})
+    assert_allclose(period / course.time_step(odd), 6, rtol=1e-9)
