@@ -909,9 +909,8 @@ def page(results: Results, sizes: Sizes) -> str:
             ],
         ),
         f"Exponent {exponent(results.spans, lambda row: row.cost):.2f} of a passage, "
-        f"{exponent(results.spans, lambda row: row.cost / row.steps):.2f} of a step: the line is "
-        "longer, and every span of it is stepped all the time, "
-        f"{per_span(results.spans) * 1e6:.2f} µs a step, sample and span.",
+        f"{exponent(results.spans, lambda row: row.cost / row.steps):.2f} of a step: the longer "
+        "the line, the more of the steps have the whole train on it.  " + per_span(results.spans),
         "",
         *table(
             ["cars", "s a passage", "steps", "µs a step and sample", "once [s]"],
@@ -972,10 +971,22 @@ def page(results: Results, sizes: Sizes) -> str:
     return "\n".join(lines)
 
 
-def per_span(rows: list[Row]) -> float:
-    """Time of a step and sample that every further span adds [s]."""
-    return float(
-        np.polyfit([row.size for row in rows], [row.cost / row.steps for row in rows], 1)[0]
+def per_span(rows: list[Row]) -> str:
+    """What a further span costs under the whole train, and what it costs when it has none.
+
+    A passage over n spans takes a + b n + c n²: every span adds its steps under the train, and to
+    all steps what it costs without one.
+    """
+    if len(rows) < 3:
+        return ""
+    size = np.array([row.size for row in rows], dtype=float)
+    cost = np.array([row.cost for row in rows])
+    c, b, _ = np.polyfit(size, cost, 2, w=1 / cost)
+    steps = (rows[-1].steps - rows[0].steps) / (size[-1] - size[0])
+    return (
+        f"Fitted by a + b n + c n², a step with the whole train on the guideway takes "
+        f"{b / steps * 1e6:.2f} µs a sample, and every span without a train adds "
+        f"{c / steps * 1e6:.3f} µs, {c / b:.1%} of that."
     )
 
 
