@@ -1,14 +1,14 @@
-"""How far each of the six extremes is from its limit: the table that sets the defaults.
+"""How far each of the six extremes is from its limit: the tables that set the defaults.
 
 Run as ``python benchmarks/convergence.py``: some minutes on one core.  One discretisation parameter
 at a time is made coarser or finer than the default; the limit has all of them fine.  The largest
 deviation over four sets of gains (coefficient of variation 0.10) and two speeds is written to
-docs/convergence.md.
+docs/convergence.md, with that of the default step at other speeds from a fine one, and that of
+quiet spans on a long line from spans that are all awake.
 """
 
 from __future__ import annotations
 
-import contextlib
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +17,8 @@ from unittest import mock
 import numpy as np
 
 from maglev.datasets import RESPONSES
-from maglev.mechanics import integrate, reduction
+from maglev.mechanics import activity, integrate, reduction
+from maglev.mechanics.course import time_step
 from maglev.parameters import Config
 from maglev.simulation import track
 
@@ -44,21 +45,38 @@ DEFAULT = Discretisation(
     refinement=Config().guideway.refinement,
     damping_drop=reduction.DAMPING_DROP,
 )
-LIMIT = Discretisation(0.12, 2000, 1000, 1, 1e-4)
+LIMIT = Discretisation(0.06, 2000, 1000, 1, 1e-4)
 VARIATIONS = {
-    "time_step_ms": ("time step [ms], upper bound", (0.44, 0.37, 0.25, 0.12)),
+    "time_step_ms": ("time step [ms], upper bound", (0.54, 0.36, 0.27, 0.12)),
     "mode_cutoff": ("mode cut-off of the middle span [Hz]", (150, 200, 300, 500, 700)),
     "mode_cutoff_elsewhere": ("mode cut-off elsewhere [Hz]", (150, 200, 300, 400)),
     "refinement": ("elements between nodes", (1, 2)),
     "damping_drop": ("damping entries dropped below", (1e-2, 3e-3, 1e-3)),
 }
 
+OTHER_SPEEDS_KMH = (100, 200, 300, 350, 400, 430, 500, 600)
+LONG_LINE = 20
+"""Spans of the line on which quiet spans are tried [-]."""
+QUIET = ((60.0, 3), (100.0, 1), (100.0, 2), (100.0, 3), (100.0, 5), (150.0, 3))
+"""Highest mode of quiet spans that is stepped [Hz], and spans beside the train that are awake."""
 
-def extremes(at: Discretisation, speed_kmh: int) -> np.ndarray:
+
+def extremes(at: Discretisation, speed_kmh: int, n_spans: int = 5) -> np.ndarray:
     """The six extremes (sample, response) of four passages."""
-    config = Config.model_validate(
+    config = configuration(at, speed_kmh, n_spans)
+    normal = np.random.default_rng(config.seed).standard_normal((4, 4))
+    gains = np.array(config.gains.as_row) * (1 + COEFFICIENT_OF_VARIATION * normal)
+    with mock.patch.object(reduction, "DAMPING_DROP", at.damping_drop):
+        system = integrate.prepare(config, track(config))
+        passages = integrate.integrate(system, gains)
+    return np.column_stack([passages.girder, passages.body_z.max(1), passages.body_y.max(1)])
+
+
+def configuration(at: Discretisation, speed_kmh: int, n_spans: int = 5) -> Config:
+    """The default configuration with another discretisation, speed and number of spans."""
+    return Config.model_validate(
         {
-            "guideway": {"refinement": at.refinement},
+            "guideway": {"refinement": at.refinement, "n_spans": n_spans},
             "passage": {
                 "speed": f"{speed_kmh} km/h",
                 "time_step": f"{at.time_step_ms} ms",
@@ -67,13 +85,6 @@ def extremes(at: Discretisation, speed_kmh: int) -> np.ndarray:
             },
         }
     )
-    normal = np.random.default_rng(config.seed).standard_normal((4, 4))
-    gains = np.array(config.gains.as_row) * (1 + COEFFICIENT_OF_VARIATION * normal)
-    with contextlib.ExitStack() as stack:
-        stack.enter_context(mock.patch.object(reduction, "DAMPING_DROP", at.damping_drop))
-        system = integrate.prepare(config, track(config))
-        passages = integrate.integrate(system, gains)
-    return np.column_stack([passages.girder, passages.body_z.max(1), passages.body_y.max(1)])
 
 
 def deviation(at: Discretisation, limits: dict[int, np.ndarray]) -> np.ndarray | None:
@@ -88,6 +99,53 @@ def deviation(at: Discretisation, limits: dict[int, np.ndarray]) -> np.ndarray |
             raise
         return None
     return 100 * np.max(worst, axis=0)
+
+
+def row_of(cells: list[str], found: np.ndarray, exact: np.ndarray) -> str:
+    """A row of a table: largest deviations over the samples [%]."""
+    worst = 100 * np.nanmax(np.abs(found / exact - 1), axis=0)
+    line = "| " + " | ".join(cells + [f"{one:.2f}" for one in worst]) + " |"
+    print(line, file=sys.stderr, flush=True)
+    return line
+
+
+def other_speeds(heads: list[str]) -> list[str]:
+    """The default step at other speeds against one of 0.06 ms, all else as by default."""
+    lines = [
+        "## The default step at other speeds",
+        "",
+        "Deviation from a step of 0.06 ms at most; the step is that used.",
+        "",
+        "| speed [km/h] | step [ms] | " + " | ".join(heads) + " |",
+        "| --- | ---: |" + " ---: |" * len(heads),
+    ]
+    for speed in OTHER_SPEEDS_KMH:
+        step = time_step(configuration(DEFAULT, speed)) * 1e3
+        exact = extremes(replace(DEFAULT, time_step_ms=0.06), speed)
+        lines.append(row_of([f"{speed}", f"{step:.3f}"], extremes(DEFAULT, speed), exact))
+    return [*lines, ""]
+
+
+def quiet_spans(heads: list[str]) -> list[str]:
+    """Quiet spans on a long line against spans that are all awake."""
+    lines = [
+        "## Quiet spans",
+        "",
+        f"Deviation on {LONG_LINE} spans at 430 km/h from a line whose spans are all awake.",
+        "",
+        "| modes stepped below [Hz] | spans awake beside the train | " + " | ".join(heads) + " |",
+        "| --- | ---: |" + " ---: |" * len(heads),
+    ]
+    with mock.patch.object(activity, "AWAKE_BESIDE", LONG_LINE):
+        exact = extremes(DEFAULT, 430, LONG_LINE)
+    usual = (activity.QUIET_CUTOFF, activity.AWAKE_BESIDE)
+    for cutoff, beside in QUIET:
+        with mock.patch.multiple(activity, QUIET_CUTOFF=cutoff, AWAKE_BESIDE=beside):
+            found = extremes(DEFAULT, 430, LONG_LINE)
+        mark = "**" if (cutoff, beside) == usual else ""
+        cells = [f"{mark}{cutoff:g}{mark}", f"{mark}{beside}{mark}"]
+        lines.append(row_of(cells, found, exact))
+    return [*lines, ""]
 
 
 def main() -> None:
@@ -124,6 +182,7 @@ def main() -> None:
             lines.append(f"| {mark}{value:g}{mark} | " + " | ".join(cells) + " |")
             print(lines[-1], file=sys.stderr, flush=True)
         lines.append("")
+    lines += other_speeds(heads) + quiet_spans(heads)
     PAGE.write_text("\n".join(lines), encoding="utf-8")
 
 

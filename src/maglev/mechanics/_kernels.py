@@ -45,8 +45,7 @@ class Vehicle(NamedTuple):
     link_start: np.ndarray  # (link + 1,) what pulls in a link
     link_scaled: np.ndarray  # (non-zero,)
     link_coefficient: np.ndarray  # (non-zero,)
-    pulled: np.ndarray  # (dof,) degrees of freedom in the order of the next rows
-    pull_start: np.ndarray  # (dof + 1,) the links that pull at each
+    pull_start: np.ndarray  # (dof + 1,) the links that pull at a degree of freedom
     pull_link: np.ndarray  # (non-zero,)
     pull_coefficient: np.ndarray  # (non-zero,)
     body_z: np.ndarray  # (car,) degree of freedom
@@ -215,7 +214,7 @@ def _links(vehicle, x, velocity, scaled, pull, force):
     for i in range(start.size - 1):
         first, last = entry(start, i), entry(start, i + 1)
         total = _sum(coefficient, vehicle.pull_link, first, last, pull, none)
-        store(force, entry(vehicle.pulled, i), none - total)
+        store(force, i, none - total)
 
 
 @njit(cache=True, error_model="numpy")

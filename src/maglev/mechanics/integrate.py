@@ -357,14 +357,10 @@ def closed_train(train: train_model.TrainModel, gains: Array) -> tuple[Array, Ar
 
 
 def _vehicle(train: train_model.TrainModel) -> Vehicle:
-    """Train for the kernels, links and degrees of freedom in the order of their coefficients'
-    number: the processor then foresees where each sum ends."""
-    order = np.argsort(np.diff(train.link_rows.tocsr().indptr), kind="stable")
-    rows = train.link_rows.tocsr()[order].sorted_indices()
+    """Train for the kernels."""
+    rows = train.link_rows.tocsr().sorted_indices()
     columns = rows.tocsc().sorted_indices()
-    dof = np.argsort(np.diff(columns.indptr), kind="stable")
-    columns = columns[:, dof]
-    link = order[np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))]
+    link = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
     hangs = np.column_stack([rows.indices, train.link_stiffness[link], train.link_damping[link]])
     scaled, number = np.unique(hangs, axis=0, return_inverse=True)
     return Vehicle(
@@ -375,7 +371,6 @@ def _vehicle(train: train_model.TrainModel) -> Vehicle:
         link_start=rows.indptr.astype(np.int64),
         link_scaled=number.ravel().astype(np.int64),
         link_coefficient=rows.data.astype(np.float64),
-        pulled=dof.astype(np.int64),
         pull_start=columns.indptr.astype(np.int64),
         pull_link=columns.indices.astype(np.int64),
         pull_coefficient=columns.data.astype(np.float64),
