@@ -1,6 +1,6 @@
 # make all    environment, then every result and figure     make test   environment, then the tests
 # make quick  the same chain on config/quick.yaml            make check  format, lint, contracts, quick tests
-# make bench  what a passage costs, about seven minutes on an idle machine
+# make bench  what a passage costs, one to seven minutes on an idle machine
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= 2
