@@ -298,10 +298,11 @@ def stepped_inertia(reduced: ReducedGuideway, time_step: float) -> Array:
 
 
 def step_response(reduced: ReducedGuideway, time_step: float) -> Array:
-    """Share of its acceleration with which each coordinate is stepped.
+    """Share of its acceleration with which each component mode is stepped; one for pier tops.
 
     Verlet's step with sinc²(ωΔt/2) times the acceleration is exact for an undamped mode of circular
-    frequency ω on its own, whatever the force at the steps; pier tops are stepped as they are.
+    frequency ω on its own, whatever the force at the steps.  Pier tops have a mass for the same
+    (`maglev.mechanics.activity.stepped_mass`).
 
     Parameters
     ----------
