@@ -34,7 +34,6 @@ from maglev.figures import style
 from maglev.fingerprint import code_of
 from maglev.mechanics import integrate, reference
 from maglev.mechanics._kernels import (
-    Line,
     _advance_line,
     _advance_train,
     _line_acceleration,
@@ -247,13 +246,8 @@ def poles_on_guideway(system: integrate.System) -> tuple[int, float]:
 
 def steps_of_stages(system: integrate.System) -> Array:
     """Steps that each stage of the guideway lasts (stage,) [-]."""
-    ends = [*system.line.stage_step[1:], n_steps(system.config) + 1]
-    return np.array(ends) - system.line.stage_step
-
-
-def span_of_stage(line: Line, stage: int) -> tuple[int, int, int]:
-    """Where in ``line.stepped`` a stage begins, where its pier tops begin, and where it ends."""
-    return line.stage_start[stage], line.stage_tops[stage], line.stage_start[stage + 1]
+    begins = system.line.stages.first_step
+    return np.diff([*begins, n_steps(system.config) + 1])
 
 
 def operations(system: integrate.System) -> dict[str, float]:
@@ -280,16 +274,16 @@ def operations(system: integrate.System) -> dict[str, float]:
         rails += share * line.stride * (2 * (2 * moved + 2) + 2 + 2 * moved)
     # guideway, of what is stepped: relative motion and its rate, forces back, stiffness, damping,
     # exact step, pier tops
-    guideway, line_states = 0.0, 0.0
+    guideway, line_states, stages = 0.0, 0.0, line.stages
     for stage, share in enumerate(steps / n_steps(system.config)):
-        start, tops, stop = span_of_stage(line, stage)
-        modes = line.stepped[start:tops]
+        start, tops, stop = stages.start[stage], stages.tops[stage], stages.start[stage + 1]
+        modes = stages.stepped[start:tops]
         carried = np.diff(line.carried_start)[modes].sum()
         each = slice(start, stop)
-        taken = (line.taken_to[each] - line.taken_from[each])[tops - start :].sum()
-        damping = (line.damping_to[each] - line.damping_from[each]).sum()
-        between = np.diff(line.stiffness_start)[line.stepped[tops:stop] - line.square.size].sum()
-        factor = line.factor_start[stop] - line.factor_start[tops]
+        taken = (stages.taken_to[each] - stages.taken_from[each])[tops - start :].sum()
+        damping = (stages.damping_to[each] - stages.damping_from[each]).sum()
+        between = np.diff(line.stiffness_start)[stages.stepped[tops:stop] - line.square.size].sum()
+        factor = stages.factor_start[stop] - stages.factor_start[tops]
         coefficients = carried + taken + modes.size + between + damping + 2 * factor
         guideway += share * (2 * coefficients + (stop - start) + 2 * modes.size + 2 * (stop - tops))
         line_states += share * 8 * (stop - start)
@@ -331,7 +325,7 @@ def _repeat_line(n, line, stage, x, velocity, force):
 @njit
 def _repeat_advance(n, line, stage, dt, x, velocity, before, acceleration, rate):
     for _ in range(n):
-        _advance_line(line, stage, dt, x, velocity, before, acceleration, rate)
+        _advance_line(line.stages, stage, dt, x, velocity, before, acceleration, rate)
 
 
 @njit

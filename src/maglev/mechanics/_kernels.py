@@ -71,6 +71,28 @@ class MagnetRows(NamedTuple):
     is_guidance: bool
 
 
+class Stages(NamedTuple):
+    """What is stepped of the guideway when: stages of a passage, and the rows that they step with.
+
+    Before the first stage the guideway rests.
+    """
+
+    first_step: np.ndarray  # (stage,) number of a step
+    start: np.ndarray  # (stage + 1,) into ``stepped``
+    tops: np.ndarray  # (stage,) where in ``stepped`` pier tops follow modes
+    stepped: np.ndarray  # coordinates that are stepped, of all stages
+    damping_from: np.ndarray  # (stepped,) row of the line's ``damping``
+    damping_to: np.ndarray
+    taken_from: np.ndarray  # (stepped,) row of the line's ``taken``
+    taken_to: np.ndarray
+    factor_start: np.ndarray  # (stepped + 1,) Cholesky rows of the mass of stepped pier tops
+    factor_top: np.ndarray  # coordinate
+    factor: np.ndarray
+    factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal
+    stilled_start: np.ndarray  # (stage + 1,) coordinates that the stage before stepped
+    stilled: np.ndarray
+
+
 class Line(NamedTuple):
     """Guideway in component coordinates: modes of spans, modes of piers, pier tops.
 
@@ -101,23 +123,9 @@ class Line(NamedTuple):
     stiffness_start: np.ndarray  # (top + 1,) between pier tops
     stiffness_top: np.ndarray  # coordinate
     stiffness: np.ndarray
-    stage_step: np.ndarray  # (stage,) first step; before the first of all the guideway rests
-    stage_start: np.ndarray  # (stage + 1,) into ``stepped``
-    stage_tops: np.ndarray  # (stage,) where pier tops follow modes
-    stepped: np.ndarray  # coordinates that are stepped
-    damping_from: np.ndarray  # of each of them, its row of ``damping``
-    damping_to: np.ndarray
-    taken_from: np.ndarray  # and of ``taken``
-    taken_to: np.ndarray
-    factor_start: np.ndarray  # (stepped + 1,) Cholesky rows of the mass of stepped pier tops
-    factor_top: np.ndarray  # coordinate
-    factor: np.ndarray
-    factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal
-    stilled_start: np.ndarray  # (stage + 1,) coordinates that were stepped before
-    stilled: np.ndarray
+    stages: Stages
     output_column: np.ndarray  # (output column,) coordinates that move midspan
     midspan: np.ndarray  # (2, output column) z and y
-    midspan_acceleration: np.ndarray  # (2, output column) the same per stepped acceleration
     middle: int  # span that midspan is of
     rest: np.ndarray  # (3, stride) midspan z by z, y by roll and y of its left-out modes [m/N]
 
@@ -493,10 +501,10 @@ def _load_line(line, span, begin, end, rail_force, turn, force):
 
 
 @njit(cache=True, error_model="numpy")
-def _still(line, stage, x, velocity, before, acceleration, rate):
+def _still(stages, stage, x, velocity, before, acceleration, rate):
     """Leave the coordinates alone that are no longer stepped: modes at rest."""
-    for k in range(line.stilled_start[stage], line.stilled_start[stage + 1]):
-        i = line.stilled[k]
+    for k in range(stages.stilled_start[stage], stages.stilled_start[stage + 1]):
+        i = stages.stilled[k]
         store(x, i, 0.0)
         store(velocity, i, 0.0)
         store(before, i, 0.0)
@@ -505,11 +513,11 @@ def _still(line, stage, x, velocity, before, acceleration, rate):
 
 
 @njit(cache=True, error_model="numpy")
-def _advance_line(line, stage, dt, x, velocity, before, acceleration, rate):
+def _advance_line(stages, stage, dt, x, velocity, before, acceleration, rate):
     """As `_advance_train` for what is stepped of the guideway; leaves no accelerations."""
     half = 0.5 * dt
-    for n in range(line.stage_start[stage], line.stage_start[stage + 1]):
-        i = entry(line.stepped, n)
+    for n in range(stages.start[stage], stages.start[stage + 1]):
+        i = entry(stages.stepped, n)
         a = load(acceleration, i)
         v = fma(a, dt, load(velocity, i))
         store(x, i, fma(v, dt, load(x, i)))
@@ -522,22 +530,22 @@ def _advance_line(line, stage, dt, x, velocity, before, acceleration, rate):
 @njit(cache=True, error_model="numpy")
 def _line_acceleration(line, stage, x, velocity, force):
     """Turn the forces on the coordinates that are stepped into accelerations, in place."""
-    n_modes = line.square.size
-    start, tops, stop = line.stage_start[stage], line.stage_tops[stage], line.stage_start[stage + 1]
+    n_modes, stages = line.square.size, line.stages
+    start, tops, stop = stages.start[stage], stages.tops[stage], stages.start[stage + 1]
     none = load(force, 0) * 0.0
     damping, column = line.damping, line.damping_column
     for n in range(start, stop):
-        i = entry(line.stepped, n)
+        i = entry(stages.stepped, n)
         if n < tops:
             back = load(x, i) * entry(line.square, i)
         else:  # modes come first
-            first, last = entry(line.taken_from, n), entry(line.taken_to, n)
+            first, last = entry(stages.taken_from, n), entry(stages.taken_to, n)
             back = _sum(line.taken, line.taken_mode, first, last, force, none)
             first = entry(line.stiffness_start, i - n_modes)
             last = entry(line.stiffness_start, i - n_modes + 1)
             back = _sum(line.stiffness, line.stiffness_top, first, last, x, back)
         drag = none
-        first, last = entry(line.damping_from, n), entry(line.damping_to, n)
+        first, last = entry(stages.damping_from, n), entry(stages.damping_to, n)
         for k in range(first, last - 1, 2):  # two sums: neither waits for the other
             drag = fma(load(velocity, entry(column, k)), entry(damping, k), drag)
             back = fma(load(velocity, entry(column, k + 1)), entry(damping, k + 1), back)
@@ -545,19 +553,19 @@ def _line_acceleration(line, stage, x, velocity, force):
             drag = fma(load(velocity, entry(column, last - 1)), entry(damping, last - 1), drag)
         store(force, i, load(force, i) - (back + drag))
     for n in range(tops, stop):
-        i = entry(line.stepped, n)
-        first, last = entry(line.factor_start, n), entry(line.factor_start, n + 1)
-        total = load(force, i) - _sum(line.factor, line.factor_top, first, last, force, none)
-        store(force, i, total * entry(line.factor_inverse, n))
+        i = entry(stages.stepped, n)
+        first, last = entry(stages.factor_start, n), entry(stages.factor_start, n + 1)
+        total = load(force, i) - _sum(stages.factor, stages.factor_top, first, last, force, none)
+        store(force, i, total * entry(stages.factor_inverse, n))
     for n in range(stop - 1, tops - 1, -1):
-        i = entry(line.stepped, n)
-        total = load(force, i) * entry(line.factor_inverse, n)
+        i = entry(stages.stepped, n)
+        total = load(force, i) * entry(stages.factor_inverse, n)
         store(force, i, total)
-        for k in range(entry(line.factor_start, n), entry(line.factor_start, n + 1)):
-            at = entry(line.factor_top, k)
-            store(force, at, load(force, at) - total * entry(line.factor, k))
+        for k in range(entry(stages.factor_start, n), entry(stages.factor_start, n + 1)):
+            at = entry(stages.factor_top, k)
+            store(force, at, load(force, at) - total * entry(stages.factor, k))
     for n in range(start, tops):
-        i = entry(line.stepped, n)
+        i = entry(stages.stepped, n)
         first, last = entry(line.carried_start, i), entry(line.carried_start, i + 1)
         along = _sum(line.carried, line.carried_top, first, last, force, none)
         store(force, i, (load(force, i) - along) * entry(line.response, i))
@@ -686,12 +694,21 @@ def passage(
         tail = nose - run.train_length
         record = run.record_every > 0 and step % run.record_every == 0
         _advance_train(vehicle, dt, x, velocity, before, predicted, force)
-        while stage + 1 < line.stage_step.size and step >= line.stage_step[stage + 1]:
+        while stage + 1 < line.stages.first_step.size and step >= line.stages.first_step[stage + 1]:
             stage += 1
-            _still(line, stage, line_x, line_velocity, line_before, line_acceleration, line_rate)
+            _still(
+                line.stages, stage, line_x, line_velocity, line_before, line_acceleration, line_rate
+            )
         if stage >= 0:
             _advance_line(
-                line, stage, dt, line_x, line_velocity, line_before, line_acceleration, line_rate
+                line.stages,
+                stage,
+                dt,
+                line_x,
+                line_velocity,
+                line_before,
+                line_acceleration,
+                line_rate,
             )
         first = max(0, int(np.floor(tail / line.span_length)))
         last = min(line.n_spans - 1, int(np.floor(nose / line.span_length)))
@@ -737,10 +754,10 @@ def passage(
             raw = shift
             n_columns = line.output_column.size
             for k in range(n_columns):
-                column, at = entry(line.output_column, k), direction * n_columns + k
-                shift = fma(load(line_x, column), entry(line.midspan, at), shift)
-                each = entry(line.midspan_acceleration, at)
-                raw = fma(load(line_acceleration, column), each, raw)
+                column = entry(line.output_column, k)
+                share = entry(line.midspan, direction * n_columns + k)
+                shift = fma(load(line_x, column), share, shift)
+                raw = fma(load(line_acceleration, column), share, raw)
             # What left-out modes add follows the forces at once; its acceleration, a second
             # difference, is that of the step before, and so is what it joins.
             rest = rest_z if direction == 0 else rest_y

@@ -22,6 +22,7 @@ from maglev.mechanics._kernels import (
     Outcome,
     Places,
     Run,
+    Stages,
     Vehicle,
     passage,
 )
@@ -545,6 +546,14 @@ def _line(reduced: ReducedGuideway, config: Config) -> Line:
     )
     carried_start, carried_top, carried = _rows(reduced.carried)
     stiffness_start, stiffness_top, stiffness = _rows(top_stiffness(reduced))
+    of_passage = stages(config, reduced)
+    always = np.logical_and.reduce([stage.stepped for stage in of_passage])
+    damping_start, damping_column, damping = _rows(
+        _whole_and_short(_stepped_damping(reduced, time_step(config)), always)
+    )
+    taken_start, taken_mode, taken = _rows(
+        _whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
+    )
     return Line(
         n_spans=reduced.parameters.n_spans,
         span_length=reduced.parameters.span_length,
@@ -567,10 +576,13 @@ def _line(reduced: ReducedGuideway, config: Config) -> Line:
         stiffness=stiffness,
         output_column=columns[middle],
         midspan=midspan,
-        midspan_acceleration=midspan,
         middle=middle,
         rest=np.stack([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
-        **_stepped_rows(reduced, config, stages(config, reduced)),
+        damping_column=damping_column,
+        damping=damping,
+        taken_mode=taken_mode,
+        taken=taken,
+        stages=_stages(reduced, config, of_passage, damping_start, taken_start),
     )
 
 
@@ -582,26 +594,36 @@ def _relative(reduced: ReducedGuideway, span: int, shape: Array) -> Array:
     return np.concatenate([shape[: own.size], shape[own.size :] + carried.T @ shape[: own.size]])
 
 
-def _stepped_rows(
-    reduced: ReducedGuideway, config: Config, of_passage: list[Stage]
-) -> dict[str, Array | IntArray]:
-    """What is stepped in each stage, and with which rows: whole ones, and short ones of quiet
-    spans that leave out what is not stepped there."""
-    n = reduced.n_modes
+def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array:
+    """Damping on the rates of the coordinates, which a step makes of modes a little too small."""
     damping = reduced.relative_damping.copy()
-    phase = np.sqrt(reduced.stiffness.diagonal()[:n]) * time_step(config)
+    phase = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes]) * time_step
     own = damping.diagonal()
-    own[:n] /= np.sinc(phase / np.pi)  # rate of a stepped mode against the true one
+    own[: reduced.n_modes] /= np.sinc(phase / np.pi)
     damping.setdiag(own)
-    always = np.logical_and.reduce([stage.stepped for stage in of_passage])
-    quiet = sp.diags_array(always.astype(float)).tocsr()
-    both = sp.vstack([damping, damping @ quiet]).tocsr()
-    both.eliminate_zeros()
-    damping_start, damping_column, damping_value = _rows(both)
-    both = sp.vstack([reduced.carried.T, reduced.carried.T @ quiet[:n, :n]]).tocsr()
-    both.eliminate_zeros()
-    taken_start, taken_mode, taken = _rows(both)
+    return damping
 
+
+def _whole_and_short(matrix: sp.csr_array, always: npt.NDArray[np.bool_]) -> sp.csr_array:
+    """The rows of a matrix, then the same without the columns that are not stepped in all stages.
+
+    Short rows are those of quiet spans.
+    """
+    both = sp.vstack([matrix, matrix @ sp.diags_array(always.astype(float))]).tocsr()
+    both.eliminate_zeros()
+    return both
+
+
+def _stages(
+    reduced: ReducedGuideway,
+    config: Config,
+    of_passage: list[Stage],
+    damping_start: IntArray,
+    taken_start: IntArray,
+) -> Stages:
+    """What is stepped in each stage, and where its whole or short rows of damping and of what modes
+    take along begin and end."""
+    n = reduced.n_modes
     starts, tops_from, stepped, rows = [0], [], [], []
     factor_rows, factor_start, inverse = [], [0], []
     stilled = []
@@ -626,26 +648,22 @@ def _stepped_rows(
     row = np.concatenate(rows)
     top_row = np.maximum(row % reduced.n_coordinates - n, 0)
     top_row += np.where(row >= reduced.n_coordinates, reduced.n_coordinates - n, 0)
-    return {
-        "stage_step": np.array([stage.first_step for stage in of_passage]),
-        "stage_start": np.array(starts),
-        "stage_tops": np.array(tops_from),
-        "stepped": np.concatenate(stepped),
-        "damping_column": damping_column,
-        "damping": damping_value,
-        "damping_from": damping_start[row],
-        "damping_to": damping_start[row + 1],
-        "taken_mode": taken_mode,
-        "taken": taken,
-        "taken_from": taken_start[top_row],
-        "taken_to": taken_start[top_row + 1],
-        "factor_start": np.array(factor_start),
-        "factor_top": np.concatenate([top for top, _ in factor_rows]),
-        "factor": np.concatenate([value for _, value in factor_rows]),
-        "factor_inverse": np.concatenate(inverse),
-        "stilled_start": np.cumsum([0, *(one.size for one in stilled)]),
-        "stilled": np.concatenate(stilled),
-    }
+    return Stages(
+        first_step=np.array([stage.first_step for stage in of_passage]),
+        start=np.array(starts),
+        tops=np.array(tops_from),
+        stepped=np.concatenate(stepped),
+        damping_from=damping_start[row],
+        damping_to=damping_start[row + 1],
+        taken_from=taken_start[top_row],
+        taken_to=taken_start[top_row + 1],
+        factor_start=np.array(factor_start),
+        factor_top=np.concatenate([top for top, _ in factor_rows]),
+        factor=np.concatenate([value for _, value in factor_rows]),
+        factor_inverse=np.concatenate(inverse),
+        stilled_start=np.cumsum([0, *(one.size for one in stilled)]),
+        stilled=np.concatenate(stilled),
+    )
 
 
 def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, Array]:

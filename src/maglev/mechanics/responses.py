@@ -41,6 +41,8 @@ class Passages:
     time : (record,)
         Elapsed time of the recorded steps [s].
     girder_history : (sample, response, record)
+        From the production solver the accelerations of a last record at the end of the passage are
+        those of the step before.
     body_z_history, body_y_history : (sample, car, record)
     gap_history, current_history : (sample, magnet, record)
         Mean gap of each magnet's poles [m] and mean current [A].
