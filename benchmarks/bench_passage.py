@@ -1,6 +1,6 @@
 """What a passage costs, of what the machine could give, and how the cost grows.
 
-    python benchmarks/bench_passage.py            # the whole of it, about seven minutes
+    python benchmarks/bench_passage.py            # the whole of it, one to seven minutes
     python benchmarks/bench_passage.py --quick    # a minute's run on small sizes, writes no docs
 
 One process on one core unless stated.  Costs are process time (seconds that the processor worked
@@ -453,7 +453,7 @@ def step_bytes(system: integrate.System) -> tuple[int, int]:
     n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
     rows = 5 * n_dof + vehicle.scaled_dof.size + vehicle.link_start.size - 1
     rows += 5 * n_line + 9 * line.n_spans * line.stride
-    shared = [*line, *vehicle]
+    shared = [*line, *line.stages, *vehicle]
     tables = sum(array.nbytes for array in shared if isinstance(array, np.ndarray))
     return rows * LANES * 8, tables
 

@@ -344,6 +344,18 @@ def test_a_row_of_lost_samples_ends_early_with_each_ones_time():
         assert passed(config, gains[[k]]).lost_time[0] == found.lost_time[k]
 
 
+def test_a_lost_sample_does_not_know_its_neighbours_either():
+    config = small(approach="60 m")
+    alone = passed(config, [TOO_SOFT], record_every=50)
+    among = passed(config, [MEAN, TOO_SOFT], record_every=50)
+    assert alone.status[0] in (CONTACT, GAP_LOST)
+    assert_same(alone, among, slice(1, None))
+    after = alone.time > alone.lost_time[0]
+    assert after.any()
+    assert np.isnan(alone.gap_history[0][:, after]).all()
+    assert np.isfinite(alone.gap_history[0][:, ~after]).all()
+
+
 @pytest.mark.parametrize(
     ("gains", "message"),
     [

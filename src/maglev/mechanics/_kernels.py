@@ -167,6 +167,9 @@ class Outcome(NamedTuple):
     status: np.ndarray  # (LANES,) int64
     lost_time: np.ndarray  # (LANES,)
     lost_magnet: np.ndarray  # (LANES,) int64
+    at_loss: (
+        np.ndarray
+    )  # (6, LANES) smallest gap, largest gap, largest current of both kinds by then
     history: np.ndarray  # (record, 4 + 2 car + 2 magnet, LANES)
 
 
@@ -630,6 +633,10 @@ def _note_lost(run, magnet_min, magnet_max, outcome, time):
                 outcome.status[lane] = NOT_FINITE
             outcome.lost_time[lane] = time
             outcome.lost_magnet[lane] = magnet
+            for kind in range(2):
+                outcome.at_loss[kind, lane] = outcome.gap_min[kind, lane]
+                outcome.at_loss[2 + kind, lane] = outcome.gap_max[kind, lane]
+                outcome.at_loss[4 + kind, lane] = outcome.current_max[kind, lane]
             break
         if outcome.status[lane] == COMPLETED:
             holding += 1

@@ -3,7 +3,8 @@
 Spans under the train and their neighbours are awake: all of their coordinates are stepped, as are
 those of the middle span, which is watched.  Other spans are quiet.  Piers pass motion on along the
 line, so that quiet spans do not rest: their pier tops and low modes are stepped, and their other
-modes follow the pier tops without a motion of their own.
+modes follow the pier tops without a motion of their own.  Damping between a mode that a quiet span
+keeps and one that its neighbour alone steps acts on the latter only.
 """
 
 from __future__ import annotations
@@ -126,7 +127,8 @@ def stepped_mass(
     """Pier tops that are stepped, and the lower Cholesky factor of their mass in a step.
 
     Modes that are not stepped follow the tops with their mass.  A share Δt²/12 of the stiffness
-    does for the tops what its response does for a mode: swings of their own keep their period.
+    does for the tops what its response does for a mode: swings of their own keep their period to
+    fourth order.
 
     Parameters
     ----------

@@ -52,7 +52,9 @@ def start(config: Config) -> float:
     """Place of the nose at time zero [m], the first pier at zero.
 
     Less than a step before ``passage.approach``, so that the poles of the suspension meet the
-    joints of the rails, at whole units from the first pier, at `JOINT_SHARE` of a step.
+    joints of the rails, at whole units from the first pier, at `JOINT_SHARE` of a step.  That holds
+    for all of them where units and C-frame spacings are whole numbers of pole pitches, as by
+    default; else for those of the first magnet at the first pier.
     """
     advance = config.passage.speed * time_step(config)
     pole = _first_pole(config.train.suspension_magnet) - 0.5 * config.train.car_pitch

@@ -53,6 +53,10 @@ LINE_MARGIN = 0.92
 [-]; measured 0.93 or more."""
 
 
+BOUNDS = ("gap_min", "gap_max", "current_max")
+"""What is kept of gaps and currents of both kinds, in the order of `Outcome.at_loss`."""
+
+
 @dataclass(frozen=True)
 class Ground:
     """Where poles of one kind can be after whole numbers of steps, and the sag of the rails there.
@@ -94,7 +98,7 @@ def prepare(config: Config, profile: Profile) -> System:
     config
         Parameters of everything.
     profile
-        Track irregularity over `track_range`.
+        Track irregularity over `track_range`; nothing before the fade-in, where the train rests.
 
     Returns
     -------
@@ -228,9 +232,9 @@ def stability_limit(
 ) -> float:
     """Largest stable time step of the production solver's scheme [s].
 
-    Modes of the whole guideway as it is stepped, those of one car with its magnets closed linearly
-    at the mean gains, and component modes on their own each have a limit that depends on their
-    damping ratio: where the amplification of the scheme passes one
+    Modes of the whole guideway with the mass of a step, made symmetric, those of one car with its
+    magnets closed linearly at the mean gains, and component modes on their own each have a limit
+    that depends on their damping ratio: where the amplification of the scheme passes one
     (docs/theory/integration.md, eq. 5).
     """
     ratio, dt = config.guideway.damping_ratio, time_step(config)
@@ -595,7 +599,11 @@ def _relative(reduced: ReducedGuideway, span: int, shape: Array) -> Array:
 
 
 def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array:
-    """Damping on the rates of the coordinates, which a step makes of modes a little too small."""
+    """Damping on the rates of the coordinates as stepped.
+
+    A mode's rate in a step, a central difference, is sinc(ωΔt) of its true one; its own damping
+    makes up for that.
+    """
     damping = reduced.relative_damping.copy()
     phase = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes]) * time_step
     own = damping.diagonal()
@@ -711,6 +719,7 @@ def _empty_outcome(system: System, run: Run) -> Outcome:
         status=np.zeros(LANES, np.int64),
         lost_time=np.full(LANES, np.nan),
         lost_magnet=np.full(LANES, -1, np.int64),
+        at_loss=np.zeros((6, LANES)),
         history=history,
     )
 
@@ -728,7 +737,14 @@ def _gathered(outcomes: list[Outcome], n_samples: int, system: System, run: Run)
     status[(status == COMPLETED) & ~np.isfinite(extreme).all(axis=1)] = NOT_FINITE
     extreme[status != COMPLETED] = np.nan
     when[status != COMPLETED] = np.nan
-    history = np.moveaxis(samples_first("history"), 1, 2)
+    # A lost sample goes on in its row as long as others hold; what it does then means nothing.
+    lost_time, is_lost = samples_first("lost_time"), samples_first("lost_magnet") >= 0
+    time = (np.arange(outcomes[0].history.shape[0]) + 1) * (run.record_every * run.time_step)
+    history = np.moveaxis(samples_first("history"), 1, 2).copy()
+    for sample in np.flatnonzero(is_lost):
+        history[sample, :, time >= lost_time[sample] - 0.5 * run.time_step] = np.nan
+    bounds = np.concatenate([samples_first(name) for name in BOUNDS], axis=1)
+    bounds = np.where(is_lost[:, None], samples_first("at_loss"), bounds)
     at = 4 + 2 * n_cars
     return Passages(
         girder=extreme[:, :4],
@@ -737,13 +753,13 @@ def _gathered(outcomes: list[Outcome], n_samples: int, system: System, run: Run)
         body_y=extreme[:, 4 + n_cars :],
         body_z_time=when[:, 4 : 4 + n_cars],
         body_y_time=when[:, 4 + n_cars :],
-        gap_min=samples_first("gap_min"),
-        gap_max=samples_first("gap_max"),
-        current_max=samples_first("current_max"),
+        gap_min=bounds[:, 0:2],
+        gap_max=bounds[:, 2:4],
+        current_max=bounds[:, 4:6],
         status=status,
-        lost_time=samples_first("lost_time"),
+        lost_time=lost_time,
         lost_magnet=samples_first("lost_magnet").astype(np.int64),
-        time=(np.arange(history.shape[2]) + 1) * (run.record_every * run.time_step),
+        time=time,
         girder_history=history[:, :4],
         body_z_history=history[:, 4 : 4 + n_cars],
         body_y_history=history[:, 4 + n_cars : at],

@@ -123,7 +123,9 @@ def acceleration_filter(passage: Passage, time_step: float) -> Array:
     Each section keeps the poles of the analogue filter, z = exp(pΔt), and a numerator that makes
     its response that of the analogue one up to the square of the frequency.  With ωΔt = 0.34 at the
     edge of the band, gain and phase of the whole are within 0.02 % and 0.0006 rad below it; the
-    bilinear transformation, bent to fit at the edge, is 0.02 rad off.
+    bilinear transformation, bent to fit at the edge, is 0.02 rad off.  The error grows with the
+    fourth power of ωΔt: 1.4 % with an edge of 300 Hz and 0.54 ms, so that a wide band needs a
+    smaller step.
 
     References
     ----------
