@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 import scipy.sparse as sp
+from threadpoolctl import threadpool_limits
 
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
@@ -90,8 +91,12 @@ class System:
     config: Config
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def prepare(config: Config, profile: Profile) -> System:
     """Build train, guideway and track for the kernels and check that they can be integrated.
+
+    Linear algebra is done on one core: on several it rounds otherwise, and a passage would depend
+    on the number of cores.
 
     Parameters
     ----------
