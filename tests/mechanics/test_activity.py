@@ -151,6 +151,23 @@ def test_what_is_stepped_keeps_the_periods_of_the_guideway():
     assert errors[0] < 0.3 * errors[1]
 
 
+def test_swings_of_pier_tops_keep_their_period_to_fourth_order():
+    """A plain step would be off by (ωΔt)²/24."""
+    reduced, step = reduced_line(), 0.54e-3
+    everything = np.ones(reduced.n_coordinates, dtype=bool)
+    tops, factor = activity.stepped_mass(reduced, everything, step)
+    at = np.ix_(tops - reduced.n_modes, tops - reduced.n_modes)
+    stiffness = activity.top_stiffness(reduced).toarray()[at]
+    exact = np.sqrt(scipy.linalg.eigvalsh(stiffness, reduced.top_mass[at]))
+    stepped = np.sqrt(scipy.linalg.eigvalsh(stiffness, factor @ factor.T))
+    phase = exact * step
+    followed = phase < 1.5
+    assert followed.sum() > 10
+    assert phase[followed].max() > 0.3
+    found = 2 / step * np.arcsin(step / 2 * stepped[followed])
+    assert np.all(np.abs(found / exact[followed] - 1) < phase[followed] ** 4 / 300 + 1e-9)
+
+
 def test_with_all_modes_kept_quiet_spans_change_no_bit():
     kept = passed(QUIET_CUTOFF=1e9)
     assert_array_equal(kept, passed(AWAKE_BESIDE=LINE.guideway.n_spans))
