@@ -60,6 +60,11 @@ def stages(config: Config, reduced: ReducedGuideway) -> list[Stage]:
         Parameters of everything.
     reduced
         Guideway in component coordinates.
+
+    Returns
+    -------
+    stages
+        In order; what is awake or stepped differs from each to the next.
     """
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
     step = np.arange(1, n_steps(config) + 1)

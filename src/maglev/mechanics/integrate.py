@@ -54,10 +54,6 @@ LINE_MARGIN = 0.92
 [-]; measured 0.93 or more."""
 
 
-BOUNDS = ("gap_min", "gap_max", "current_max")
-"""What is kept of gaps and currents of both kinds, in the order of `Outcome.at_loss`."""
-
-
 @dataclass(frozen=True)
 class Ground:
     """Where poles of one kind can be after whole numbers of steps, and the sag of the rails there.
@@ -296,10 +292,11 @@ def stepped_stiffness(reduced: ReducedGuideway) -> Array:
 
 
 def stepped_inertia(reduced: ReducedGuideway, time_step: float) -> Array:
-    """Mass (coordinate, coordinate) to go with `stepped_stiffness`, as a time step makes it.
+    """Mass (coordinate, coordinate) to go with `stepped_stiffness`, as in a time step, symmetric.
 
     A component mode has the inverse of its response as the mass of its own motion, and the pier
-    tops a share of their stiffness on top of their mass.
+    tops a share of their stiffness on top of their mass.  The step itself is not symmetric: pier
+    tops feel the modes' forces without their response (docs/theory/integration.md, eq. 4).
     """
     carried = reduced.carried.toarray()
     own = np.diag(1 / step_response(reduced, time_step)[: reduced.n_modes])
@@ -748,7 +745,8 @@ def _gathered(outcomes: list[Outcome], n_samples: int, system: System, run: Run)
     history = np.moveaxis(samples_first("history"), 1, 2).copy()
     for sample in np.flatnonzero(is_lost):
         history[sample, :, time >= lost_time[sample] - 0.5 * run.time_step] = np.nan
-    bounds = np.concatenate([samples_first(name) for name in BOUNDS], axis=1)
+    kept = ("gap_min", "gap_max", "current_max")  # in the order of `Outcome.at_loss`
+    bounds = np.concatenate([samples_first(name) for name in kept], axis=1)
     bounds = np.where(is_lost[:, None], samples_first("at_loss"), bounds)
     at = 4 + 2 * n_cars
     return Passages(
