@@ -269,8 +269,22 @@ class Rod(Parameters):
         "N/m", "lower end to car body, lateral", 2e5, source="M, A", confidence="L", above=0
     )
     end_damping: float = quantity(
-        "N s/m", "lower end to car body, lateral", 3e3, source="M, A", confidence="L", minimum=0
+        "N s/m",
+        "lower end to car body, lateral, in series with the pendulum",
+        0.0,
+        source="A",
+        confidence="L",
+        minimum=0,
     )
+
+
+class LateralDamper(Parameters):
+    """Damper between car body and C-frame, lateral, beside each rod."""
+
+    damping: float = quantity(
+        "N s/m", "lateral damping", 3e3, source="M", confidence="L", minimum=0
+    )
+    z: float = quantity("m", "below the deck level (negative: above)", 0.0, source="A", confidence="L")
 
 
 class AirSpring(Parameters):
@@ -288,10 +302,10 @@ class AirSpring(Parameters):
 
 
 class Magnet(Parameters):
-    """A row of poles on one rigid magnet body, its suspension on the C-frames and its control.
+    """A row of poles on one rigid magnet body, its suspension on the C-frames and its currents.
 
-    The magnet hangs with both ends on neighbouring C-frames.  Every pole has its own gap, its own
-    controller and its own current; all of a kind share the gains.
+    The magnet hangs with both ends on neighbouring C-frames.  The gap of a pole is the mean over
+    its face, and so is its force on the rail.  Which poles share a circuit says ``control``.
     """
 
     mass: float = quantity("kg", "mass", 600, source="H", confidence="M", above=0)
@@ -329,6 +343,14 @@ class Magnet(Parameters):
     pole_pitch: float = quantity(
         "m", "distance of neighbouring poles", 0.258, source="P", confidence="H", above=0
     )
+    pole_length: float = quantity(
+        "m",
+        "length of a pole's face along the rail; 0: a point",
+        0.17,
+        source="H, A",
+        confidence="L",
+        minimum=0,
+    )
     gap_reference: float = quantity(
         "m", "gap at rest, δ₀", "10 mm", source="H", confidence="H", above=0
     )
@@ -353,6 +375,11 @@ class Magnet(Parameters):
                 f"current_max must exceed current_reference = {self.current_reference:g} A, "
                 f"got {self.current_max:g} A"
             )
+        if self.pole_length > self.pole_pitch * (1 + 1e-12):
+            raise ValueError(
+                f"pole_length must not exceed pole_pitch = {self.pole_pitch:g} m, "
+                f"got {self.pole_length:g} m"
+            )
         return self
 
 
@@ -371,6 +398,7 @@ class Train(Parameters):
     car_body: CarBody = CarBody()
     bogie: Bogie = Bogie()
     rod: Rod = Rod()
+    lateral_damper: LateralDamper = LateralDamper()
     air_spring: AirSpring = AirSpring()
     suspension_magnet: Magnet = Magnet()
     guidance_magnet: Magnet = Field(
@@ -378,11 +406,12 @@ class Train(Parameters):
             mass="390 kg",
             inertia="310 kg m^2",
             y="1.465 m",
-            z="-0.18 m",
+            z="0.18 m",
             end_stiffness="5e6 N/m",
             end_damping="1e4 N s/m",
             n_poles=3,
             pole_pitch="1.032 m",
+            pole_length="0.516 m",
             gap_reference="10 mm",
             current_reference="25 A",
             preload="10 kN",
@@ -390,6 +419,7 @@ class Train(Parameters):
         json_schema_extra={
             "origins": {
                 "z": ["H", "M"],
+                "pole_length": ["A", "L"],
                 "gap_reference": ["A", "L"],
                 "current_reference": ["A", "L"],
             }
@@ -727,7 +757,11 @@ class Irregularity(Parameters):
 
 
 class Gains(Parameters):
-    """Mean proportional and derivative gains of the PD controllers."""
+    """Mean gains of the controllers: current per gap error, its rate, and two more, unused at zero.
+
+    i = i₀ + k_p e + k_d de/dt + k_a a + k_i ∫e dt, with the error e of the gap and the acceleration
+    a of the magnet in the direction that opens the gap.
+    """
 
     suspension_proportional: float = quantity(
         "A/m", "suspension k_p, mean", 3500, source="D, S1", confidence="M", above=0
@@ -741,6 +775,28 @@ class Gains(Parameters):
     guidance_derivative: float = quantity(
         "A s/m", "guidance k_d, mean", 17.5, source="D, S1", confidence="M", minimum=0
     )
+    suspension_acceleration: float = quantity(
+        "A s^2/m",
+        "suspension k_a, feedback of the magnet's acceleration",
+        0.0,
+        source="A",
+        confidence="L",
+        minimum=0,
+    )
+    suspension_integral: float = quantity(
+        "A/(m s)", "suspension k_i, integral part", 0.0, source="A", confidence="L", minimum=0
+    )
+    guidance_acceleration: float = quantity(
+        "A s^2/m",
+        "guidance k_a, feedback of the magnet's acceleration",
+        0.0,
+        source="A",
+        confidence="L",
+        minimum=0,
+    )
+    guidance_integral: float = quantity(
+        "A/(m s)", "guidance k_i, integral part", 0.0, source="A", confidence="L", minimum=0
+    )
 
     @property
     def as_row(self) -> tuple[float, float, float, float]:
@@ -751,6 +807,65 @@ class Gains(Parameters):
             self.guidance_proportional,
             self.guidance_derivative,
         )
+
+    @property
+    def further(self) -> tuple[float, float, float, float]:
+        """Suspension k_a, k_i, guidance k_a, k_i: columns 4 to 7 where gains have eight."""
+        return (
+            self.suspension_acceleration,
+            self.suspension_integral,
+            self.guidance_acceleration,
+            self.guidance_integral,
+        )
+
+
+_GROUP_OF_A_MAGNET = (
+    "group 'magnet', one signal for the whole magnet with forces pole by pole, cannot hold the "
+    "train: the bogies zigzag, the mean gap does not see it, and the motion grows by about 45 1/s "
+    "whatever the gains; use 'pole', 'ends', 'half' or 'lumped'"
+)
+
+
+class Circuit(Parameters):
+    """Which poles share a circuit, from which gap it is fed, and how late its current comes.
+
+    ``pole``: every pole has a circuit of its own, fed by its own gap.  ``ends``: two a magnet, each
+    fed by the gap at the outermost pole of its half.  ``half``: two a magnet, each fed by the mean
+    gap of its half.  ``lumped``: one a magnet, fed by the mean gap, which its force goes by too.
+    """
+
+    group: Literal["pole", "ends", "half", "lumped"] = Field(
+        "pole",
+        description="who shares a circuit: each pole its own, each half fed at the magnet's end "
+        "(ends), each half fed by its mean gap (half), a magnet with one force (lumped)",
+        json_schema_extra={"source": "A", "confidence": "L"},
+    )
+    lag: float = quantity(
+        "s",
+        "time constant with which the current follows its command",
+        "0 ms",
+        source="A",
+        confidence="L",
+        minimum=0,
+        below=1.0,
+    )
+    delay: float = quantity(
+        "s", "pure delay of the signal", "0 ms", source="A", confidence="L", minimum=0, below=0.1
+    )
+
+    @field_validator("group", mode="before")
+    @classmethod
+    def _refuse_magnet(cls, value: Any) -> Any:
+        if value == "magnet":
+            raise ValueError(_GROUP_OF_A_MAGNET)
+        return value
+
+
+class Control(Parameters):
+    """The circuits of suspension and guidance magnets."""
+
+    suspension: Circuit = Circuit()
+    guidance: Circuit = Circuit()
 
 
 class Passage(Parameters):
@@ -1079,6 +1194,7 @@ class Config(Parameters):
     guideway: Guideway = Guideway()
     irregularity: Irregularity = Irregularity()
     gains: Gains = Gains()
+    control: Control = Control()
     passage: Passage = Passage()
     validation: Validation = Validation()
     study: Study = Study()
@@ -1181,6 +1297,13 @@ class Config(Parameters):
                     f"train.{kind}_magnet.gap_reference must lie between passage.gap_contact = "
                     f"{self.passage.gap_contact:g} m and passage.gap_lost = "
                     f"{self.passage.gap_lost:g} m, got {magnet.gap_reference:g} m"
+                )
+            if magnet.pole_length == 0 and self.passage.acceleration_band is None:
+                raise ValueError(
+                    "passage.acceleration_band: null (raw accelerations) needs poles with a length, "
+                    f"got train.{kind}_magnet.pole_length = 0 m: points step on and off the rail's "
+                    "joints, and the raw acceleration has no limit as step and cut-off are refined; "
+                    "give a pole_length or a band"
                 )
         if self.irregularity.fade_in > self.passage.approach:
             raise ValueError(

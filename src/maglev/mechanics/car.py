@@ -52,21 +52,48 @@ class CFrame:
     Attributes
     ----------
     body
-        Degrees of freedom, those of the bogie's centre at deck level and the roll.
-    arm
-        Distance ahead of the bogie's centre [m].
+        Degrees of freedom.  The bogie's y and z are those of the centres of the mass that moves
+        with it in each direction, and the roll is about the height of the C-frame's own, so that
+        the mass matrix is diagonal.
+    lateral_arm, vertical_arm
+        Distance of the C-frame ahead of the centre of the lateral and of the vertical mass [m].
+    roll_z
+        Height of the roll's axis, below deck level [m].
     """
 
     body: Body
-    arm: float
+    lateral_arm: float
+    vertical_arm: float
+    roll_z: float
 
     def lateral(self, z: float) -> Motion:
         """Motion in y of the place ``z`` below deck level [m]."""
-        return self.body.lateral(self.arm, z)
+        return self.body.lateral(self.lateral_arm, z - self.roll_z)
 
     def vertical(self, y: float) -> Motion:
         """Motion in z of the place ``y`` right of the centre line [m]."""
-        return self.body.vertical(self.arm, y)
+        return self.body.vertical(self.vertical_arm, y)
+
+
+@dataclass(frozen=True)
+class Lump:
+    """A mass on a C-frame, one on either side, with the directions in which it moves with it.
+
+    Attributes
+    ----------
+    mass
+        Of each of the two [kg].
+    y, z
+        Place right of the centre line (and left of it) and below deck level [m].
+    lateral, vertical
+        Whether it moves with the C-frame in that direction, or has a freedom of its own.
+    """
+
+    mass: float
+    y: float
+    z: float
+    lateral: bool = True
+    vertical: bool = True
 
 
 @dataclass(frozen=True)
@@ -118,7 +145,9 @@ def station_x(train: Train) -> tuple[float, ...]:
     return tuple((0.5 * (N_C_FRAMES - 1) - k) * spacing for k in range(N_C_FRAMES))
 
 
-def add_car(assembly: Assembly, train: Train, name: str) -> Car:
+def add_car(
+    assembly: Assembly, train: Train, name: str, *, is_first: bool = True, is_last: bool = True
+) -> Car:
     """Add one car: car body, four bogies, sixteen rods, fourteen magnets of each kind.
 
     Parameters
@@ -129,6 +158,8 @@ def add_car(assembly: Assembly, train: Train, name: str) -> Car:
         Parameters of the train.
     name
         Prefix of the names of the degrees of freedom.
+    is_first, is_last
+        Whether no car is ahead or behind: the end C-frame then carries magnets on one side only.
 
     Returns
     -------
@@ -146,7 +177,13 @@ def add_car(assembly: Assembly, train: Train, name: str) -> Car:
     c_frames = [
         c_frame
         for bogie in range(N_BOGIES)
-        for c_frame in _add_bogie(assembly, train, f"{name}.bogie{bogie}")
+        for c_frame in _add_bogie(
+            assembly,
+            train,
+            f"{name}.bogie{bogie}",
+            front_ends=1 if is_first and bogie == 0 else 2,
+            rear_ends=1 if is_last and bogie == N_BOGIES - 1 else 2,
+        )
     ]
     for station, (x, c_frame) in enumerate(zip(station_x(train), c_frames, strict=True)):
         for side in (RIGHT, LEFT):
@@ -199,7 +236,7 @@ def add_magnet(
     kind = "guidance" if is_guidance else "suspension"
     translation, rotation = ("y", "psi") if is_guidance else ("z", "theta")
     prefix = f"{name}.{kind}{station}_{_side_name(side)}"
-    # A guidance magnet has no vertical freedom: its weight is left out of the static state.
+    # A guidance magnet has no vertical freedom: its weight hangs on the C-frames.
     weight = 0.0 if is_guidance else p.mass * GRAVITY
     translation_dof = assembly.add_dof(f"{prefix}.{translation}", p.mass, weight)
     rotation_dof = assembly.add_dof(f"{prefix}.{rotation}", p.inertia)
@@ -233,32 +270,72 @@ def _magnet_against_c_frame(
     return relative(magnet.vertical(dx, 0.0), c_frame.vertical(side * p.y))
 
 
-def _add_bogie(assembly: Assembly, train: Train, name: str) -> tuple[CFrame, CFrame]:
-    """Add a bogie with the masses of its four rods at their pivots; return front and rear C-frame.
+def _lumps(train: Train, n_ends: int) -> tuple[Lump, ...]:
+    """What rides on a C-frame besides its own mass.
 
-    The rods' parallel-axis terms about the bogie's centre go to pitch, yaw and the C-frames' roll.
-    The products of inertia that a pivot above or below deck level brings (y-phi and phi-psi) are
-    neglected: the mass matrix stays diagonal.
+    Parameters
+    ----------
+    train
+        Parameters of the train.
+    n_ends
+        Magnets of each kind and side that end on the C-frame: two, one at the ends of the train.
     """
-    p, rod = train.bogie, train.rod
-    arm = 0.5 * p.c_frame_spacing
-    mass = p.mass + 4 * rod.mass
-    pitch = p.pitch_inertia + 4 * rod.mass * (arm**2 + rod.pivot_z**2)
-    yaw = p.yaw_inertia + 4 * rod.mass * (arm**2 + rod.pivot_y**2)
-    roll = p.c_frame_roll_inertia + 2 * rod.mass * (rod.pivot_y**2 + rod.pivot_z**2)
-    y = assembly.add_dof(f"{name}.y", mass)
-    z = assembly.add_dof(f"{name}.z", mass, mass * GRAVITY)
+    rod, suspension, guidance = train.rod, train.suspension_magnet, train.guidance_magnet
+    half = 0.5 * n_ends
+    return (
+        Lump(rod.mass, rod.pivot_y, rod.pivot_z),
+        Lump(half * suspension.mass, suspension.y, suspension.z, vertical=False),
+        Lump(half * guidance.mass, guidance.y, guidance.z, lateral=False),
+    )
+
+
+def _add_bogie(
+    assembly: Assembly, train: Train, name: str, *, front_ends: int, rear_ends: int
+) -> tuple[CFrame, CFrame]:
+    """Add a bogie with all that rides on it; return front and rear C-frame.
+
+    Half of its own mass is at either C-frame, at deck level.  Rods ride at their pivots, magnets
+    with half their mass at each end in every direction in which they have no freedom; none has one
+    along travel.  About the centres of mass of each direction the products of inertia vanish.
+    """
+    p = train.bogie
+    arms = (0.5 * p.c_frame_spacing, -0.5 * p.c_frame_spacing)
+    ridden = (_lumps(train, front_ends), _lumps(train, rear_ends))
+    lateral = [0.5 * p.mass + 2 * sum(m.mass for m in lumps if m.lateral) for lumps in ridden]
+    vertical = [0.5 * p.mass + 2 * sum(m.mass for m in lumps if m.vertical) for lumps in ridden]
+    lateral_x = sum(m * arm for m, arm in zip(lateral, arms, strict=True)) / sum(lateral)
+    vertical_x = sum(m * arm for m, arm in zip(vertical, arms, strict=True)) / sum(vertical)
+    roll_z = [
+        2 * sum(m.mass * m.z for m in lumps if m.lateral) / mass
+        for lumps, mass in zip(ridden, lateral, strict=True)
+    ]
+    riding = [(m, arm) for lumps, arm in zip(ridden, arms, strict=True) for m in lumps]
+    pitch = p.pitch_inertia - sum(vertical) * vertical_x**2
+    pitch += 2 * sum(m.mass * (m.vertical * arm**2 + m.z**2) for m, arm in riding)
+    yaw = p.yaw_inertia - sum(lateral) * lateral_x**2
+    yaw += 2 * sum(m.mass * (m.lateral * arm**2 + m.y**2) for m, arm in riding)
+    roll = [
+        p.c_frame_roll_inertia
+        - mass * height**2
+        + 2 * sum(m.mass * (m.vertical * m.y**2 + m.lateral * m.z**2) for m in lumps)
+        for lumps, mass, height in zip(ridden, lateral, roll_z, strict=True)
+    ]
+    y = assembly.add_dof(f"{name}.y", sum(lateral))
+    z = assembly.add_dof(f"{name}.z", sum(vertical), sum(vertical) * GRAVITY)
     theta = assembly.add_dof(f"{name}.theta", pitch)
     psi = assembly.add_dof(f"{name}.psi", yaw)
-    phi_front = assembly.add_dof(f"{name}.phi_front", roll)
-    phi_rear = assembly.add_dof(f"{name}.phi_rear", roll)
+    phi_front = assembly.add_dof(f"{name}.phi_front", roll[0])
+    phi_rear = assembly.add_dof(f"{name}.phi_rear", roll[1])
     assembly.links.append(
         Link({phi_front: 1.0, phi_rear: -1.0}, p.roll_stiffness, p.roll_damping),
     )
-    return (
-        CFrame(Body(y=y, z=z, phi=phi_front, theta=theta, psi=psi), arm),
-        CFrame(Body(y=y, z=z, phi=phi_rear, theta=theta, psi=psi), -arm),
+    front, rear = (
+        CFrame(
+            Body(y=y, z=z, phi=phi, theta=theta, psi=psi), arm - lateral_x, arm - vertical_x, height
+        )
+        for phi, arm, height in zip((phi_front, phi_rear), arms, roll_z, strict=True)
     )
+    return front, rear
 
 
 def _add_support(
@@ -270,8 +347,8 @@ def _add_support(
     c_frame: CFrame,
     side: int,
 ) -> None:
-    """Carry the car body on one side of a C-frame: an air spring and a rod."""
-    spring, rod = train.air_spring, train.rod
+    """Carry the car body on one side of a C-frame: an air spring, a rod and a lateral damper."""
+    spring, rod, damper = train.air_spring, train.rod, train.lateral_damper
     assembly.links.append(
         Link(
             relative(body.vertical(x, side * spring.y), c_frame.vertical(side * spring.y)),
@@ -279,6 +356,8 @@ def _add_support(
             spring.damping,
         )
     )
+    across = body.lateral(x, train.car_body.height + damper.z)
+    assembly.links.append(Link(relative(across, c_frame.lateral(damper.z)), 0.0, damper.damping))
     phi = assembly.add_dof(f"{name}.phi", rod.inertia)
     end_z = rod.pivot_z + rod.length
     rod_end = relative(c_frame.lateral(rod.pivot_z), {phi: rod.length})

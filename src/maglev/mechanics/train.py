@@ -131,7 +131,13 @@ def build(train: Train) -> TrainModel:
     cars = []
     magnets: list[tuple[int, HungMagnet]] = []
     for number in range(train.n_cars):
-        car = add_car(assembly, train, f"car{number}")
+        car = add_car(
+            assembly,
+            train,
+            f"car{number}",
+            is_first=number == 0,
+            is_last=number == train.n_cars - 1,
+        )
         if cars:
             magnets += [
                 (
