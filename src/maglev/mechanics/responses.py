@@ -68,13 +68,16 @@ class Passages:
     current_history: Array
 
 
-def checked_gains(gains: npt.ArrayLike) -> Array:
-    """Return the gains as (sample, 4) doubles.
+def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4) -> Array:
+    """Return the gains as (sample, 8) doubles.
 
     Parameters
     ----------
-    gains : (sample, 4)
-        Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d.
+    gains : (sample, 4) or (sample, 8)
+        Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d; then suspension k_a [A s²/m],
+        k_i [A/(m s)], guidance k_a, k_i.
+    further : (4,)
+        The last four where only four are given, from `maglev.parameters.Gains.further`.
 
     Raises
     ------
@@ -82,8 +85,8 @@ def checked_gains(gains: npt.ArrayLike) -> Array:
         If they have another shape, no sample, or a value that is not finite.
     """
     array = np.asarray(gains, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != 4:
-        hint = "; transpose them" if array.ndim == 2 and array.shape[0] == 4 else ""
+    if array.ndim != 2 or array.shape[1] not in (4, 8):
+        hint = "; transpose them" if array.ndim == 2 and array.shape[0] in (4, 8) else ""
         raise ValueError(
             f"gains have shape {array.shape}, expected (sample, gain) = (any, 4){hint}"
         )
@@ -95,7 +98,9 @@ def checked_gains(gains: npt.ArrayLike) -> Array:
             f"gains must be finite, got {array[bad[0]].tolist()} at sample {bad[0]}"
             + (f" and {bad.size - 1} more such samples" if bad.size > 1 else "")
         )
-    return array
+    if array.shape[1] == 4:
+        array = np.column_stack([array, np.broadcast_to(further, array.shape)])
+    return np.ascontiguousarray(array)
 
 
 def acceleration_filter(passage: Passage, time_step: float) -> Array:

@@ -1,0 +1,87 @@
+"""Who shares a circuit: which gaps feed it, and which poles it drives.
+
+A circuit gives the current of one pole, of half a magnet or of a whole one.  Its signal is a mean
+of gaps; `Grouping` holds the weights, for the poles of one magnet from the front.  The law itself,
+docs/theory/control.md, eq. 1, stands in each solver and in `maglev.mechanics.linear` once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from maglev.parameters import Circuit
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """Circuits of one magnet.
+
+    Attributes
+    ----------
+    feed : (circuit, pole)
+        Weight of each pole's gap in the signal of a circuit [-]; rows sum to one.
+    drive : (pole, circuit)
+        Weight of each circuit's current in the current of a pole [-]; rows sum to one.
+    mean_gap_force
+        Whether the forces go by the mean gap of the magnet instead of each pole's own.
+    """
+
+    feed: Array
+    drive: Array
+    mean_gap_force: bool
+
+
+def grouping(group: str, n_poles: int) -> Grouping:
+    """Circuits of a magnet with ``n_poles`` poles.
+
+    The middle pole of an odd number belongs to both halves: it counts half in either mean, and its
+    current is the mean of the two.  The sensor at a magnet's end reads the gap of the outermost pole.
+
+    Parameters
+    ----------
+    group
+        ``"pole"``, ``"ends"``, ``"half"`` or ``"lumped"``, see `maglev.parameters.Circuit`.
+    n_poles
+        Poles of the magnet.
+
+    Returns
+    -------
+    grouping
+        Weights of gaps and currents.
+
+    Raises
+    ------
+    ValueError
+        If the group is unknown.
+
+    Examples
+    --------
+    >>> grouping("half", 3).drive
+    array([[1. , 0. ],
+           [0.5, 0.5],
+           [0. , 1. ]])
+    """
+    if group == "pole":
+        return Grouping(np.eye(n_poles), np.eye(n_poles), mean_gap_force=False)
+    if group == "lumped":
+        mean = np.full((1, n_poles), 1.0 / n_poles)
+        return Grouping(mean, np.ones((n_poles, 1)), mean_gap_force=True)
+    if group not in ("ends", "half"):
+        raise ValueError(f"group must be 'pole', 'ends', 'half' or 'lumped', got {group!r}")
+    place = np.arange(n_poles) - 0.5 * (n_poles - 1)
+    front = np.where(place < 0, 1.0, np.where(place > 0, 0.0, 0.5))
+    drive = np.column_stack([front, 1.0 - front])
+    feed = drive.T / drive.sum(axis=0)[:, None]
+    if group == "ends":
+        feed = np.eye(n_poles)[[0, n_poles - 1]]
+    return Grouping(feed, drive, mean_gap_force=False)
+
+
+def circuits(circuit: Circuit, n_poles: int) -> Grouping:
+    """The `grouping` that a configuration asks for."""
+    return grouping(circuit.group, n_poles)
