@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from maglev.compiled import kernel
 from maglev.mechanics._records import Circuits, Magnet
-from maglev.mechanics._rows import weighted_sum, zeros
+from maglev.mechanics._rows import zeros
 from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, minimum, store
 
 
@@ -88,10 +88,11 @@ def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
         if law.own_gap:
             error, rate = load(magnet.error, c), load(magnet.rate, c)
         else:
-            begin, end = entry(law.feed_start, c), entry(law.feed_start, c + 1)
-            weight, pole = law.feed_weight, law.feed_pole
-            error = weighted_sum(weight, pole, begin, end, magnet.error, none)
-            rate = weighted_sum(weight, pole, begin, end, magnet.rate, none)
+            error, rate = none, none
+            for j in range(entry(law.feed_start, c), entry(law.feed_start, c + 1)):
+                pole, weight = entry(law.feed_pole, j), entry(law.feed_weight, j)
+                error = fma(load(magnet.error, pole), weight, error)
+                rate = fma(load(magnet.rate, pole), weight, rate)
         here = first + c
         if law.integrates:
             mean = load(circuits.error, here) + error
@@ -136,12 +137,13 @@ def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
 
 @kernel()
 def _attract(rows, law, row, side, gains, magnet):
-    """Pull of each pole; return the smallest and largest gap and the strongest current."""
+    """Pull of each pole; return its sum and moment, the extreme gaps and the strongest current."""
     sign = rows.outward[side]
     n_poles = rows.offset.size
     none = load(magnet.error, 0) * 0.0
     reference = none + rows.gap_reference
     smallest, largest, strongest = none + 1.0e9, none - 1.0e9, none
+    total, moment = none, none
     mean_gap = reference
     if law.mean_gap_force:
         for p in range(n_poles):
@@ -153,7 +155,10 @@ def _attract(rows, law, row, side, gains, magnet):
             current = (current + load(magnet.current, entry(law.second, p))) * 0.5
         ratio = current / mean_gap if law.mean_gap_force else current / gap
         constant = entry(rows.constant, (2 * row + side) * n_poles + p)
-        store(magnet.pull, p, ratio * ratio * (sign * constant))
+        pull = ratio * ratio * (sign * constant)
+        store(magnet.pull, p, pull)
+        total = total + pull
+        moment = fma(pull, entry(rows.arm, p), moment)
         if law.accelerates:
             by = mean_gap if law.mean_gap_force else gap
             direct = law.command_now * law.undelayed
@@ -163,7 +168,7 @@ def _attract(rows, law, row, side, gains, magnet):
         smallest = minimum(smallest, gap)
         largest = maximum(largest, gap)
         strongest = maximum(strongest, current)
-    return smallest, largest, strongest
+    return total, moment, smallest, largest, strongest
 
 
 @kernel()
@@ -258,12 +263,7 @@ def attract(
             translation, rotation = rows.translation[row, side], rows.rotation[row, side]
             _look(places, rows, law, row, side, step, train, rails, magnet)
             _control(rows, law, row, side, step, dt, gains, train, magnet, circuits)
-            smallest, largest, strong = _attract(rows, law, row, side, gains, magnet)
-            total, moment = none, none
-            for p in range(n_poles):
-                pull = load(magnet.pull, p)
-                total = total + pull
-                moment = fma(pull, entry(rows.arm, p), moment)
+            total, moment, smallest, largest, strong = _attract(rows, law, row, side, gains, magnet)
             force = load(train.force, translation) - (total - rows.static_force[row, side] * sign)
             turn = load(train.force, rotation) - (moment - rows.static_moment[row, side] * sign)
             if law.accelerates:
