@@ -24,7 +24,7 @@ from scipy.sparse.csgraph import connected_components
 from maglev.mechanics.car import N_BOGIES, N_C_FRAMES
 from maglev.mechanics.control import circuits
 from maglev.mechanics.train import TrainModel, pole_offsets, pole_static_force
-from maglev.parameters import Control
+from maglev.parameters import Circuit, Control
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -54,15 +54,16 @@ class Loop:
 
     Attributes
     ----------
-    freedoms : (freedom,)
-        Coordinates of the block that belong to magnets of the kind.
-    pull : (freedom, freedom)
-        Closing force [N, N m] per unit of current gain and of each freedom: the matrix G.
+    fed_by : (freedom,)
+        Coordinates of the block whose motion makes the signal.
+    pull : (coordinate, freedom)
+        Closing force [N, N m] per unit of current gain and of each of them: what the matrix G is
+        in these columns.
     lag, delay
         Time constant τ of the current and delay T of the signal [s].
     """
 
-    freedoms: IntArray
+    fed_by: IntArray
     pull: Array
     lag: float
     delay: float
@@ -192,11 +193,6 @@ def blocks(train: TrainModel, control: Control) -> tuple[Block, ...]:
     """
     attraction, *drawn = closing_matrices(train, control)
     matrices = (train.stiffness.toarray() + attraction, train.damping.toarray(), *drawn)
-    table = train.magnets
-    of_kind = [np.zeros(train.mass.size, dtype=bool) for _ in drawn]
-    for kind, own in enumerate(of_kind):
-        rows = table.is_guidance == bool(kind)
-        own[table.translation_dof[rows]] = own[table.rotation_dof[rows]] = True
     found = []
     for shape in _families(train):
         reduced = [shape.T @ matrix @ shape for matrix in matrices]
@@ -209,16 +205,20 @@ def blocks(train: TrainModel, control: Control) -> tuple[Block, ...]:
             chosen = np.flatnonzero(part == number)
             own_shape = shape[:, chosen]
             stiffness, damping, *pulls = (one[np.ix_(chosen, chosen)] for one in reduced)
-            loops = []
-            for own, pull, circuit in zip(
-                of_kind, pulls, (control.suspension, control.guidance), strict=True
-            ):
-                freedoms = np.flatnonzero(np.abs(own_shape[own]).max(axis=0, initial=0.0) > 0)
-                inner = pull[np.ix_(freedoms, freedoms)]
-                loops.append(Loop(freedoms, inner, circuit.lag, circuit.delay))
+            loops = [
+                _loop(pull, _NOT_COUPLED * np.abs(whole).max(), circuit)
+                for pull, whole, circuit in zip(
+                    pulls, drawn, (control.suspension, control.guidance), strict=True
+                )
+            ]
             mass = np.square(own_shape).T @ train.mass
             found.append(Block(own_shape, mass, damping, stiffness, (loops[0], loops[1])))
     return tuple(found)
+
+
+def _loop(pull: Array, least: float, circuit: Circuit) -> Loop:
+    fed_by = np.flatnonzero(np.abs(pull).max(axis=0) > least)
+    return Loop(fed_by, pull[:, fed_by], circuit.lag, circuit.delay)
 
 
 def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
@@ -250,7 +250,7 @@ def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
             (current, loop.lag > 0.0, 1),
             (late, loop.delay > 0.0 and n_nodes > 0, n_nodes),
         ):
-            size = loop.freedoms.size * times if wanted else 0
+            size = loop.fed_by.size * times if wanted else 0
             places.append(slice(sum(sizes), sum(sizes) + size))
             sizes.append(size)
     n_state = sum(sizes)
@@ -261,23 +261,20 @@ def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
         / block.mass[:, None]
     )
     for kind, (k, loop) in enumerate(zip(of_kinds(gains), block.loops, strict=True)):
-        size = loop.freedoms.size
-        if size == 0:
-            continue
+        size = loop.fed_by.size
         k_p, k_d, k_a, k_i = k
-        rate = n + loop.freedoms
-        acts = -loop.pull / block.mass[loop.freedoms, None]  # acceleration per current
+        acts = -loop.pull / block.mass[:, None]  # acceleration per current
         # The signal is seen @ x + fed @ (the current, where that is no state).
         if loop.lag > 0.0:
-            state[rate, current[kind]] += acts
-        seen, fed = k_a * state[rate], np.zeros((size, size))
-        seen[np.arange(size), loop.freedoms] += k_p
-        seen[np.arange(size), rate] += k_d
+            state[n : 2 * n, current[kind]] += acts
+        seen, fed = k_a * state[n + loop.fed_by], np.zeros((size, size))
+        seen[np.arange(size), loop.fed_by] += k_p
+        seen[np.arange(size), n + loop.fed_by] += k_d
         if k_i != 0.0:
-            state[integral[kind], :][np.arange(size), loop.freedoms] = 1.0
+            state[integral[kind], :][np.arange(size), loop.fed_by] = 1.0
             seen[:, integral[kind]] += k_i * np.eye(size)
         if loop.lag == 0.0:
-            fed = k_a * acts
+            fed = k_a * acts[loop.fed_by]
         # What the circuit follows, arrived @ x, is the signal of now or from the end of the delay.
         if late[kind].stop > late[kind].start:
             arrived = np.zeros((size, n_state))
@@ -291,7 +288,7 @@ def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
             state[current[kind]] = arrived / loop.lag
             state[current[kind], current[kind]] -= np.eye(size) / loop.lag
         else:
-            state[rate] += acts @ arrived
+            state[n : 2 * n] += acts @ arrived
     return state
 
 
@@ -320,9 +317,8 @@ def characteristic(block: Block, gains: Array, s: complex) -> tuple[Array, Array
             signal, signal_slope = signal + k_i / s, signal_slope - k_i / s**2
         follows = np.exp(-loop.delay * s) / (1 + loop.lag * s)
         follows_slope = -follows * (loop.delay + loop.lag / (1 + loop.lag * s))
-        at = np.ix_(loop.freedoms, loop.freedoms)
-        matrix[at] += signal * follows * loop.pull
-        slope[at] += (signal_slope * follows + signal * follows_slope) * loop.pull
+        matrix[:, loop.fed_by] += signal * follows * loop.pull
+        slope[:, loop.fed_by] += (signal_slope * follows + signal * follows_slope) * loop.pull
     return matrix, slope
 
 
@@ -344,7 +340,7 @@ def rightmost(block: Block, gains: Array) -> complex:
     RuntimeError
         If the collocation does not settle.
     """
-    if not any(loop.delay > 0.0 and loop.freedoms.size for loop in block.loops):
+    if not any(loop.delay > 0.0 and loop.fed_by.size for loop in block.loops):
         roots = scipy.linalg.eigvals(state_matrix(block, gains))
         return _rightmost(roots)
     n_nodes = _NODES
