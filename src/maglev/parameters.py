@@ -284,7 +284,8 @@ class LateralDamper(Parameters):
     damping: float = quantity(
         "N s/m", "lateral damping", 3e3, source="M", confidence="L", minimum=0
     )
-    z: float = quantity("m", "below the deck level (negative: above)", -0.5, source="A", confidence="L"
+    z: float = quantity(
+        "m", "below the deck level (negative: above)", -0.5, source="A", confidence="L"
     )
 
 
@@ -1112,7 +1113,7 @@ class Study(Parameters):
         return self
 
 
-_RESERVED = ("config", "track", "guideway", "figures", "tables", "checks", "report")
+_RESERVED = ("config", "track", "guideway", "train", "figures", "tables", "checks", "report")
 """Folders beside those of the cases."""
 
 

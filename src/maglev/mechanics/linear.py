@@ -340,7 +340,7 @@ def rightmost(block: Block, gains: Array) -> complex:
     RuntimeError
         If the collocation does not settle.
     """
-    if not any(loop.delay > 0.0 and loop.fed_by.size for loop in block.loops):
+    if not _late(block):
         roots = scipy.linalg.eigvals(state_matrix(block, gains))
         return _rightmost(roots)
     n_nodes = _NODES
@@ -378,6 +378,48 @@ def growth_rate(parts: tuple[Block, ...], gains: Array) -> float:
     docs/theory/control.md.
     """
     return max(rightmost(block, gains).real for block in parts)
+
+
+def modes(
+    parts: tuple[Block, ...], gains: Array
+) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
+    """Oscillations of the levitated train, from the slowest.
+
+    With delay there are more of them without end, fast and of the circuits; one for each pair of
+    roots that the train has without delay is kept, the slowest.
+
+    Parameters
+    ----------
+    parts
+        The train, from `blocks`.
+    gains : (8,)
+        As in `closed_train`.
+
+    Returns
+    -------
+    root : (mode,)
+        With positive imaginary part [1/s]: the frequency is its size.
+    shape : (mode, dof)
+        Motion of the train's degrees of freedom, complex, without scale.
+    """
+    found: list[tuple[complex, npt.NDArray[np.complex128]]] = []
+    for block in parts:
+        n = block.mass.size
+        roots, shapes = scipy.linalg.eig(state_matrix(block, gains))
+        pairs = int((roots.imag > 0).sum())
+        if _late(block):
+            longest = max(loop.delay for loop in block.loops)
+            n_nodes = _NODES + int(np.abs(roots).max() * longest)
+            roots, shapes = scipy.linalg.eig(state_matrix(block, gains, n_nodes))
+        order = np.argsort(np.abs(roots))
+        slowest = [k for k in order if roots[k].imag > 0][:pairs]
+        for k in slowest:
+            root = complex(roots[k])
+            if _late(block):
+                root = _polished(block, gains, root, shapes[:n, k])
+            found.append((root, block.shape @ shapes[:n, k]))
+    found.sort(key=lambda one: abs(one[0]))
+    return np.array([root for root, _ in found]), np.array([shape for _, shape in found])
 
 
 def border(
@@ -425,6 +467,10 @@ def border(
         if rate(outer) >= 0:
             return float(brentq(rate, inner, outer, xtol=1e-9 * abs(outer - inner), rtol=1e-10))
     return float("nan")
+
+
+def _late(block: Block) -> bool:
+    return any(loop.delay > 0.0 and loop.fed_by.size for loop in block.loops)
 
 
 def _rightmost(roots: npt.NDArray[np.complex128]) -> complex:
