@@ -63,6 +63,7 @@ rule all:
         rules.histories.output,
         rules.gaps.output,
         rules.modes.output,
+        rules.fig_train_modes.output,
         runs_of_all_cases(),
         statistics_of_all_cases(),
         figures_of_study(),

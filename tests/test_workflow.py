@@ -83,13 +83,14 @@ def drawn(tmp_path_factory):
 def test_a_dry_run_of_all_lists_every_step_of_the_method(fresh):
     jobs = fresh.would_run("all")
     assert jobs == {
-        "run_config": 1, "stage_config": 16, "case_config": 11, "method_config": 4,
+        "run_config": 1, "stage_config": 17, "case_config": 11, "method_config": 4,
         "irregularity": 1, "guideway_modes": 1, "passage": 1, "deflection": 1, "dynamic_factor": 1,
         "points": 5, "adaptive_points": 3, "mcm_chunk": 3, "mcm": 2, "design": 4, "track_runs": 4,
         "surrogate": 4, "eev": 4, "density": 4, "density_mcm": 2, "limits": 4, "limits_mcm": 2,
         "accuracy": 1, "track_split": 1, "statistics": 1, "table1": 1, "paper_and_ours": 1,
         "prediction": 1, "stability": 1,
         "fig7": 1, "fig8": 1, "histories": 1, "gaps": 1, "modes": 1, "all": 1,
+        "train_modes": 1, "fig_train_modes": 1,
         "fig9": 1, "fig10": 1, "fig11": 1, "fig12": 1, "fig15": 1, "fig16": 1, "fig_sobol": 1,
         "fig_stability": 1, "fig_accuracy": 1, "fig_scatter": 1, "fig_track_split": 1,
     }  # fmt: skip

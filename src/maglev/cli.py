@@ -102,6 +102,18 @@ def modes(configs: tuple[Path, ...], out: Path) -> None:
     save(modes.dataset(parameters), out, "modes", parameters, inputs)
 
 
+@main.command("train-modes")
+@_config
+@_out
+def train_modes(configs: tuple[Path, ...], out: Path) -> None:
+    """Compute the modes of one levitated car at the mean gains."""
+    from maglev.config import load_config
+    from maglev.stages import save, train_modes
+
+    parameters = load_config(*configs)
+    save(train_modes.dataset(parameters), out, "train_modes", parameters)
+
+
 @main.command()
 @_config
 @_out

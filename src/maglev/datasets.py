@@ -52,6 +52,19 @@ METHODS = ("mcm", "osm", "asm_paper", "asm")
 SURROGATES = ("rbf", "scaled_rbf", "kriging")
 """The kinds of surrogate."""
 
+TRAIN_PARTS = (
+    "car_body_lateral",
+    "car_body_vertical",
+    "car_body_roll",
+    "car_body_pitch",
+    "car_body_yaw",
+    "bogies",
+    "rods",
+    "suspension_magnets",
+    "guidance_magnets",
+)
+"""What moves in a mode of the train."""
+
 DECISIONS = (
     "go_on",
     "error_below_threshold",
@@ -574,14 +587,56 @@ def _study_table() -> dict[str, Variable]:
         "growth_rate": _number(
             "grid_derivative grid_proportional",
             "s-1",
-            "fastest growth of a motion of one car with its magnets closed linearly over a rigid "
-            "track; negative where every motion dies out",
+            "fastest growth of a motion of one car, linearised over a rigid track with the "
+            "configured control; negative where every motion dies out",
+        ),
+        "mean_growth_rate": _number(
+            "", "s-1", "fastest growth of a motion at the mean gains, with the configured control"
+        ),
+        **{
+            f"{gain}_border_{side}": _number(
+                "",
+                units,
+                f"{word} at which the car ceases to be stable {where} the mean gains, the other "
+                f"gains at their means; NaN if it does not {how}",
+            )
+            for gain, units, word in (
+                ("proportional", "A m-1", "suspension proportional gain"),
+                ("derivative", "A s m-1", "suspension derivative gain"),
+            )
+            for side, where, how in (
+                ("low", "below", "down to zero"),
+                ("high", "above", "up to ten times the mean"),
+            )
+        },
+        "current_lag": _number("current_lag", "s", "lag of the suspension's current"),
+        "proportional_border": _number(
+            "current_lag grid_derivative",
+            "A m-1",
+            "suspension proportional gain below which the car is not stable at each derivative "
+            "gain; NaN if there is none in the map, or the mean is not stable",
+        ),
+        "derivative_border": _number(
+            "current_lag grid_proportional",
+            "A s m-1",
+            "suspension derivative gain below which the car is not stable at each proportional "
+            "gain; NaN if there is none, or the mean is not stable",
         ),
         "static_limit": _number(
             "", "A m-1", "suspension proportional gain below which a magnet cannot hold: i0/delta0"
         ),
         "mean_proportional": _number("", "A m-1", "mean suspension proportional gain"),
         "mean_derivative": _number("", "A s m-1", "mean suspension derivative gain"),
+        # modes of the train
+        "train_part": _code("train_part", "what moves", TRAIN_PARTS),
+        "train_frequency": _number(
+            "mode", "Hz", "natural frequency of the levitated car: size of the root over 2 pi"
+        ),
+        "damping_ratio": _number("mode", "1", "damping over critical damping"),
+        "kinetic_share": _number(
+            "mode train_part", "1", "share of the mode's kinetic energy in what moves"
+        ),
+        "moves": _code("mode", "what holds most of the mode's kinetic energy", TRAIN_PARTS),
         # random track
         "density_both": _number(
             "response cell",
@@ -834,6 +889,10 @@ LAYOUTS: Mapping[str, Layout] = {
             "measured_frequency",
         ),
     ),
+    "train_modes": Layout(
+        title="Natural modes of one levitated car at the mean gains",
+        variables=("train_frequency", "damping_ratio", "kinetic_share", "moves"),
+    ),
     "deflection": Layout(
         title="Midspan deflection under the passing train",
         variables=(
@@ -954,7 +1013,19 @@ LAYOUTS: Mapping[str, Layout] = {
     ),
     "stability": Layout(
         title="Stability of the levitated train by the gains of the suspension",
-        variables=("growth_rate", "static_limit", "mean_proportional", "mean_derivative"),
+        variables=(
+            "growth_rate",
+            "mean_growth_rate",
+            "static_limit",
+            "proportional_border_low",
+            "proportional_border_high",
+            "derivative_border_low",
+            "derivative_border_high",
+            "proportional_border",
+            "derivative_border",
+            "mean_proportional",
+            "mean_derivative",
+        ),
     ),
     "track_split": Layout(
         title="What random gains and a random track contribute to the extremes",

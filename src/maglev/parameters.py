@@ -823,7 +823,7 @@ class Gains(Parameters):
 
 _GROUP_OF_A_MAGNET = (
     "group 'magnet', one signal for the whole magnet with forces pole by pole, cannot hold the "
-    "train: the bogies zigzag, the mean gap does not see it, and the motion grows by about 45 1/s "
+    "train: the bogies zigzag, the mean gap does not see it, and the motion grows by about 42 1/s "
     "whatever the gains; use 'pole', 'ends', 'half' or 'lumped'"
 )
 
@@ -1113,7 +1113,7 @@ class Study(Parameters):
         return self
 
 
-_RESERVED = ("config", "track", "guideway", "figures", "tables", "checks", "report")
+_RESERVED = ("config", "track", "guideway", "train", "figures", "tables", "checks", "report")
 """Folders beside those of the cases."""
 
 

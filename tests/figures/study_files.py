@@ -186,6 +186,12 @@ def stability():
             ("grid_derivative", "grid_proportional"), np.tile((2600 - k_p) / 100, (k_d.size, 1))
         ),
         "static_limit": ((), 2500.0),
+        "proportional_border_low": ((), 2600.0),
+        "proportional_border": (("current_lag", "grid_derivative"), np.full((2, k_d.size), 2600.0)),
+        "derivative_border": (
+            ("current_lag", "grid_proportional"), np.outer([np.nan, 5.0], np.ones(k_p.size))
+        ),
+        "current_lag": ("current_lag", [0.0, 2e-3]),
         "mean_proportional": ((), MEAN[0]),
         "mean_derivative": ((), MEAN[1]),
         "grid_proportional": ("grid_proportional", k_p),

@@ -8,11 +8,11 @@ from maglev import datasets
 from maglev.datasets import LAYOUTS, VARIABLES
 from maglev.figures import FIGURES, draw
 
-VALIDATION = ("irregularity", "deflection", "histories", "gaps", "modes")
+VALIDATION = ("irregularity", "deflection", "histories", "gaps", "modes", "train_modes")
 
 SIZES = {
     "sample": 1, "car": 2, "magnet": 4, "t": 400, "x": 60, "side": 2, "mode": 6,
-    "wavenumber": 20, "speed": 4, "measured_speed": 1,
+    "wavenumber": 20, "train_part": 9, "speed": 4, "measured_speed": 1,
 }  # fmt: skip
 
 
@@ -37,6 +37,8 @@ def tiny(layout):
     if layout == "modes":
         data["direction"] = (("mode",), np.array([0, 1, 2, 3, 2, 1]))
         data["frequency"] = (("mode",), np.array([2.0, 3.0, 8.5, 20.0, 28.0, 30.0]))
+    if layout == "train_modes":
+        data["moves"] = (("mode",), np.array([0, 1, 4, 5, 7, 8]))
     if layout == "dynamic_factor":
         data["passage_status"] = (("speed",), np.array([0, 0, 1, 0]))
     dataset = xr.Dataset(data, coords=coords)

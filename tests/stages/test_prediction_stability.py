@@ -5,9 +5,9 @@ import pytest
 import synthetic
 from numpy.testing import assert_allclose
 
-from maglev.datasets import check, describe
+from maglev.datasets import TRAIN_PARTS, check, describe
 from maglev.parameters import Config
-from maglev.stages import density, prediction, stability, surrogate
+from maglev.stages import density, prediction, stability, surrogate, train_modes
 from maglev.uncertainty.gdee import direct_density
 
 CONFIG = synthetic.CONFIG
@@ -34,17 +34,61 @@ def test_a_design_without_its_surrogate_is_refused():
         prediction.dataset(CONFIG, synthetic.baseline(50), {"asm": synthetic.design(40)}, {})
 
 
-def test_the_map_grows_below_the_static_limit_and_dies_out_above(monkeypatch):
+def test_the_map_grows_below_its_borders_and_dies_out_above(monkeypatch):
     monkeypatch.setattr(stability, "N_PROPORTIONAL", 5)
-    monkeypatch.setattr(stability, "N_DERIVATIVE", 2)
+    monkeypatch.setattr(stability, "N_DERIVATIVE", 3)
     config = Config()
     found = describe(stability.dataset(config))
     check(found, "stability")
     magnet = config.train.suspension_magnet
     assert found["static_limit"] == magnet.current_reference / magnet.gap_reference
+    # A root of the growth rate, not a line between two points of the map.
+    assert_allclose(found["proportional_border_low"], 2500.0, atol=1e-3)
+    assert_allclose(found["proportional_border"][0], 2500.0, atol=1e-3)
+    assert np.isnan(found["derivative_border"][0]).all()
+    assert found["mean_growth_rate"] < 0
     k_p, growth = found["grid_proportional"].to_numpy(), found["growth_rate"].to_numpy()
-    assert (growth[:, k_p < 0.95 * float(found["static_limit"])] > 1.0).all()
-    assert (growth[:, k_p > 1.2 * float(found["static_limit"])] < 0.0).all()
+    assert (growth[:, k_p < 2500.0] > 0.0).all()
+    assert (growth[:, k_p > 2500.0] < 0.0).all()
+    late = found.sel(current_lag=2e-3)
+    assert np.isnan(late["proportional_border"][0])  # no derivative gain
+    assert_allclose(late["proportional_border"][1:], 2500.0, atol=1e-3)
+    assert_allclose(late["derivative_border"].sel(grid_proportional=3500.0), 4.83, atol=0.01)
+
+
+def test_the_map_follows_the_configured_control(monkeypatch):
+    monkeypatch.setattr(stability, "N_PROPORTIONAL", 2)
+    monkeypatch.setattr(stability, "N_DERIVATIVE", 2)
+    half = Config(control={"suspension": {"group": "half", "lag": "2 ms"}})
+    found = stability.dataset(half)
+    assert_allclose(found["proportional_border_low"], 3115.2, atol=0.1)
+    assert_allclose(found["derivative_border_low"], 4.74, atol=0.01)
+    late = Config(control={"suspension": {"delay": "2 ms"}})
+    assert_allclose(stability.dataset(late)["derivative_border_high"], 69.9, atol=0.1)
+
+
+def test_lateral_and_yaw_modes_of_the_car_body_are_damped_as_a_secondary_suspension_is():
+    found = describe(train_modes.dataset(Config()))
+    check(found, "train_modes")
+    assert_allclose(found["kinetic_share"].sum("train_part"), 1.0)
+    assert (found["damping_ratio"] > 0).all()
+    assert found.sizes["mode"] == 101
+    body = found.isel(mode=slice(0, 5))  # below all others
+    moves = [TRAIN_PARTS[code] for code in body["moves"].to_numpy()]
+    assert sorted(moves) == sorted(TRAIN_PARTS[:5])
+    assert (body["kinetic_share"].max("train_part") > 0.9).all()
+    by_name = {
+        name: (float(f), float(d))
+        for name, f, d in zip(moves, body["train_frequency"], body["damping_ratio"], strict=True)
+    }
+    for name, frequency, ratio in (
+        ("car_body_lateral", 0.523, 0.120),
+        ("car_body_yaw", 0.608, 0.142),
+        ("car_body_vertical", 1.388, 0.106),
+    ):
+        assert_allclose(by_name[name], (frequency, ratio), rtol=5e-3)
+    for name in ("car_body_lateral", "car_body_yaw"):
+        assert 0.10 < by_name[name][1] < 0.25
 
 
 def test_the_band_of_a_density_is_that_of_repeated_samples():

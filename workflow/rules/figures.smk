@@ -100,3 +100,23 @@ rule modes:
         "Draw the guideway's modes and frequencies"
     shell:
         "maglev figure modes {input} --out {params.out} 2> {log}"
+
+
+rule fig_train_modes:
+    input:
+        "<results>/train/modes.nc",
+    output:
+        multiext("<results>/figures/fig_train_modes", ".png", ".pdf", ".nc"),
+    log:
+        "<logs>/fig_train_modes.log",
+    benchmark:
+        "<benchmarks>/fig_train_modes.tsv"
+    conda:
+        "../envs/maglev.yaml"
+    params:
+        out=subpath(output[0], strip_suffix=".png"),
+        code=code_of("figures", "figures.train_modes"),
+    message:
+        "Draw the train's modes by frequency and damping"
+    shell:
+        "maglev figure train_modes {input} --out {params.out} 2> {log}"

@@ -21,6 +21,25 @@ rule passage:
         "maglev passage --config {input.config} --out {output} 2> {log}"
 
 
+rule train_modes:
+    input:
+        config="<results>/config/train_modes.yaml",
+    output:
+        "<results>/train/modes.nc",
+    log:
+        "<logs>/train_modes.log",
+    benchmark:
+        "<benchmarks>/train_modes.tsv"
+    conda:
+        "../envs/maglev.yaml"
+    params:
+        code=code_of("stages.train_modes"),
+    message:
+        "Compute the modes of one levitated car"
+    shell:
+        "maglev train-modes --config {input.config} --out {output} 2> {log}"
+
+
 rule deflection:
     input:
         config="<results>/config/deflection.yaml",

@@ -11,6 +11,7 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "histories": ("passage",),
     "gaps": ("passage",),
     "modes": ("modes",),
+    "train_modes": ("train_modes",),
     "training": ("accuracy", "design*"),
     "prediction": ("prediction",),
     "density_by_method": ("density*",),

@@ -11,6 +11,7 @@ from maglev.datasets import STATUS
 from maglev.figures import labels, style
 
 _LOST = "#D55E00"
+_COLOURS, _LINES = (_LOST, "#CC79A7"), ("-", ":")  # without lag, with lag
 _MARKERS = {1: "x", 2: "+", 3: "*"}
 
 
@@ -53,14 +54,19 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
             word = f"lost: {STATUS[code].replace('_', ' ')}"
             look = {"ls": "", "marker": marker, "ms": 4, "mew": 0.8, "color": "#000000"}
             chart.plot(k_p[chosen], k_d[chosen], **look, label=word)
-    chart.contour(x, y, growth, levels=[0.0], colors=[_LOST], linewidths=1.2)
+    lags = stability["current_lag"].to_numpy()
+    for lag, line, colour in zip(lags, _LINES, _COLOURS, strict=True):
+        of_lag = stability.sel(current_lag=lag)
+        by_k_d = (of_lag["proportional_border"].to_numpy()[::-1], y[::-1])
+        by_k_p = (x, of_lag["derivative_border"].to_numpy())
+        chart.plot(*np.hstack([by_k_d, by_k_p]), line, color=colour, lw=1.2, zorder=3)
     chart.axvline(static, color="#000000", ls="--", lw=0.9)
     chart.plot(
         float(stability["mean_proportional"]), float(stability["mean_derivative"]), "P",
         color="white", mec="#000000", mew=0.6, ms=6,
     )  # fmt: skip
     chart.set(xlabel="suspension $k_p$ [A/m]", ylabel="suspension $k_d$ [A s/m]")
-    chart.set(xlim=_around(np.append(k_p, static), x), ylim=_around(k_d, y))
+    chart.set(xlim=_around(np.append(k_p, static), x), ylim=(y.min(), _around(k_d, y)[1]))
     chart.grid(visible=False)
 
     edges = np.linspace(k_p.min(), k_p.max(), 41)
@@ -69,7 +75,7 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
     count.stairs(held_count, edges, color="#0072B2", fill=True, alpha=0.5, label="held")
     count.stairs(lost_count, edges, color="#000000", fill=True, label="lost")
     count.axvline(static, color="#000000", ls="--", lw=0.9)
-    border = _border(x, growth[int(np.abs(y - float(stability["mean_derivative"])).argmin())])
+    border = float(stability["proportional_border_low"])
     count.axvline(border, color=_LOST, lw=1.2)
     count.set(yscale="log", ylim=(0.7, None), xlim=_around(np.append(k_p, static), x))
     count.set(xlabel="suspension $k_p$ [A/m]", ylabel="runs")
@@ -82,13 +88,14 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
     handles += [
         Line2D([], [], color="#0072B2", ls="", marker=".", ms=4),
         Line2D([], [], color="#000000", ls="--", lw=0.9),
-        Line2D([], [], color=_LOST, lw=1.2),
+        *(Line2D([], [], color=c, ls=s, lw=1.2) for c, s in zip(_COLOURS, _LINES, strict=True)),
         Line2D([], [], color="white", mec="#000000", mew=0.6, ls="", marker="P", ms=6),
     ]
     words += [
         "held",
         f"static limit $i_0/\\delta_0$ = {static:.0f} A/m",
-        f"border of the linearised train, {border:.0f} A/m at the mean $k_d$",
+        f"border of the linearised train, {border:.1f} A/m at the mean $k_d$",
+        *(f"border with {1e3 * lag:g} ms of lag" for lag in lags[1:]),
         "mean gains",
     ]
     style.below(fig, handles, words, ncols=3)
@@ -100,12 +107,3 @@ def _around(gains: np.ndarray, grid: np.ndarray) -> tuple[float, float]:
     """Range of the runs with a margin, within that of the map."""
     margin = 0.06 * np.ptp(gains)
     return max(gains.min() - margin, grid.min()), min(gains.max() + margin, grid.max())
-
-
-def _border(gain: np.ndarray, growth: np.ndarray) -> float:
-    """Largest gain at which the growth rate passes zero, NaN if it never does."""
-    grows = np.flatnonzero(growth > 0)
-    if grows.size == 0 or grows[-1] + 1 == gain.size:
-        return float("nan")
-    k = int(grows[-1])
-    return float(np.interp(0.0, -growth[k : k + 2], gain[k : k + 2]))

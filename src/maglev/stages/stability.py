@@ -1,52 +1,38 @@
-"""Where gains of the suspension hold the train: the static limit and the linearised train."""
+"""Where gains of the suspension hold the train: the linearised train and its borders."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 import xarray as xr
 
 from maglev.mechanics import train as train_model
-from maglev.mechanics.step_limit import closed_train
-from maglev.parameters import Config
+from maglev.mechanics.linear import Block, blocks, border, growth_rate
+from maglev.mechanics.responses import checked_gains
+from maglev.parameters import Config, Control
 
-PROPORTIONAL_RANGE, DERIVATIVE_RANGE = (0.4, 1.6), (0.4, 1.6)
+PROPORTIONAL_RANGE, DERIVATIVE_RANGE = (0.4, 1.6), (0.0, 1.6)
 """Gains of the map over their means [-]: four deviations on either side at a coefficient of
-variation of 0.15."""
+variation of 0.15, and down to no derivative gain, where a lag has its border."""
 
-N_PROPORTIONAL, N_DERIVATIVE = 37, 19
+N_PROPORTIONAL, N_DERIVATIVE = 37, 25
 """Size of the map, finer along the gain that decides."""
 
+LAGS = (0.0, 2e-3)
+"""Lags of the suspension's current whose borders are drawn [s]."""
 
-def growth_rate(train: train_model.TrainModel, gains: npt.NDArray[np.float64]) -> float:
-    """Fastest growth of a motion of the levitated train on a rigid track [1/s].
+FARTHEST = 10.0
+"""How far a border is sought above the mean gains, over the mean [-]."""
 
-    Parameters
-    ----------
-    train
-        Train with open magnets.
-    gains : (4,)
-        Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d.
+N_STEPS = 12
+"""Steps of the search for a border in the map, each a tenth of the mean or less."""
 
-    Returns
-    -------
-    rate
-        Largest real part of the poles; negative where every motion dies out.
-
-    References
-    ----------
-    docs/theory/train.md, the linearised magnet.
-    """
-    stiffness, damping = closed_train(train, gains)
-    n = train.mass.size
-    inverse = 1.0 / train.mass[:, None]
-    state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse * stiffness, -inverse * damping]])
-    return float(scipy.linalg.eigvals(state).real.max())
+PROPORTIONAL, DERIVATIVE = 0, 1
+"""Places of the suspension's k_p and k_d among the gains."""
 
 
 def dataset(config: Config) -> xr.Dataset:
-    """Map the growth rate of one car over the two gains of the suspension.
+    """Map the growth rate of one car over the two gains of the suspension, and its borders.
 
     Guidance has its mean gains.  Neighbouring cars, the elastic guideway, the limits of gap and
     current and the nonlinear force are not in it: the passages say what they change.
@@ -62,20 +48,85 @@ def dataset(config: Config) -> xr.Dataset:
         Layout ``stability``.
     """
     one_car = train_model.build(config.train.model_copy(update={"n_cars": 1}))
-    mean = np.array(config.gains.as_row)
-    proportional = mean[0] * np.linspace(*PROPORTIONAL_RANGE, N_PROPORTIONAL)
-    derivative = mean[1] * np.linspace(*DERIVATIVE_RANGE, N_DERIVATIVE)
+    mean = checked_gains([config.gains.as_row], config.gains.further)[0]
+    proportional = mean[PROPORTIONAL] * np.linspace(*PROPORTIONAL_RANGE, N_PROPORTIONAL)
+    derivative = mean[DERIVATIVE] * np.linspace(*DERIVATIVE_RANGE, N_DERIVATIVE)
+    parts = blocks(one_car, config.control)
     rate = [
-        [growth_rate(one_car, np.array([k_p, k_d, *mean[2:]])) for k_p in proportional]
-        for k_d in derivative
+        [growth_rate(parts, _moved(mean, k_p, k_d)) for k_p in proportional] for k_d in derivative
     ]
+    with_lag = [blocks(one_car, _lagging(config.control, lag)) for lag in LAGS]
     magnet = config.train.suspension_magnet
+    ends = {
+        f"{name}_border_{side}": ((), _border(parts, mean, gain, limit * mean[gain], 24))
+        for name, gain in (("proportional", PROPORTIONAL), ("derivative", DERIVATIVE))
+        for side, limit in (("low", 0.0), ("high", FARTHEST))
+    }
     return xr.Dataset(
         {
             "growth_rate": (("grid_derivative", "grid_proportional"), np.array(rate)),
+            "mean_growth_rate": ((), growth_rate(parts, mean)),
             "static_limit": ((), magnet.current_reference / magnet.gap_reference),
-            "mean_proportional": ((), mean[0]),
-            "mean_derivative": ((), mean[1]),
+            **ends,
+            "proportional_border": (
+                ("current_lag", "grid_derivative"),
+                [
+                    [
+                        _border(
+                            late,
+                            _moved(mean, mean[PROPORTIONAL], k_d),
+                            PROPORTIONAL,
+                            proportional[0],
+                        )
+                        for k_d in derivative
+                    ]
+                    for late in with_lag
+                ],
+            ),
+            "derivative_border": (
+                ("current_lag", "grid_proportional"),
+                [
+                    [
+                        _border(
+                            late, _moved(mean, k_p, mean[DERIVATIVE]), DERIVATIVE, derivative[0]
+                        )
+                        for k_p in proportional
+                    ]
+                    for late in with_lag
+                ],
+            ),
+            "mean_proportional": ((), mean[PROPORTIONAL]),
+            "mean_derivative": ((), mean[DERIVATIVE]),
         },
-        coords={"grid_proportional": proportional, "grid_derivative": derivative},
+        coords={
+            "grid_proportional": proportional,
+            "grid_derivative": derivative,
+            "current_lag": list(LAGS),
+        },
     )
+
+
+def _moved(mean: npt.NDArray[np.float64], k_p: float, k_d: float) -> npt.NDArray[np.float64]:
+    gains = mean.copy()
+    gains[[PROPORTIONAL, DERIVATIVE]] = k_p, k_d
+    return gains
+
+
+def _lagging(control: Control, lag: float) -> Control:
+    """The control with another lag of the suspension's current."""
+    return control.model_copy(
+        update={"suspension": control.suspension.model_copy(update={"lag": lag})}
+    )
+
+
+def _border(
+    parts: tuple[Block, ...],
+    gains: npt.NDArray[np.float64],
+    gain: int,
+    limit: float,
+    n_steps: int = N_STEPS,
+) -> float:
+    """The border from the gains to the limit; NaN if there is none or it begins outside."""
+    if growth_rate(parts, gains) >= 0:
+        return float("nan")
+    return border(parts, gains, gain, limit, n_steps)
