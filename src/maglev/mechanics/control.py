@@ -7,6 +7,7 @@ docs/theory/control.md, eq. 1, stands in each solver and in `maglev.mechanics.li
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,6 +81,75 @@ def grouping(group: str, n_poles: int) -> Grouping:
     if group == "ends":
         feed = np.eye(n_poles)[[0, n_poles - 1]]
     return Grouping(feed, drive, mean_gap_force=False)
+
+
+@dataclass(frozen=True)
+class LateCurrent:
+    """How a current follows its signal from step to step: delay, then lag.
+
+    ``command = Σ delayed[j] signal[n - behind - j]`` and
+    ``current[n] = decay current[n - 1] + now command[n] + before command[n - 1]``.
+
+    Attributes
+    ----------
+    behind
+        Steps back to the latest of the three signals that a delayed one is taken from.
+    delayed : (3,)
+        Their weights, those of a parabola through them [-].
+    decay, now, before
+        Weights of a lag that follows a command exactly if that is linear within a step [-].
+    """
+
+    behind: int
+    delayed: Array
+    decay: float
+    now: float
+    before: float
+
+    @property
+    def undelayed(self) -> float:
+        """Weight of the signal of this step in the command of this step [-]."""
+        return float(self.delayed[0]) if self.behind == 0 else 0.0
+
+    @property
+    def direct(self) -> float:
+        """Weight of the signal of this step in the current of this step [-]."""
+        return self.now * self.undelayed
+
+
+def late_current(lag: float, delay: float, time_step: float) -> LateCurrent:
+    """Delay and lag in steps.
+
+    Parameters
+    ----------
+    lag, delay
+        Time constant of the current and delay of the signal [s].
+    time_step
+        Δt [s].
+
+    Returns
+    -------
+    late
+        Weights of signals, commands and currents.
+
+    References
+    ----------
+    docs/theory/control.md, eqs. 2 and 3.
+
+    Examples
+    --------
+    >>> late_current(lag=0.0, delay=0.0, time_step=1e-3).direct
+    1.0
+    """
+    whole = math.floor(delay / time_step * (1 + 1e-12))
+    behind = max(0, whole - 1)
+    t = delay / time_step - behind  # steps before the latest of the three
+    delayed = np.array([(t - 1) * (t - 2) / 2, t * (2 - t), t * (t - 1) / 2])
+    if lag == 0:
+        return LateCurrent(behind, delayed, 0.0, 1.0, 0.0)
+    part = time_step / lag
+    decay, mean = math.exp(-part), -math.expm1(-part) / part
+    return LateCurrent(behind, delayed, decay, 1.0 - mean, mean - decay)
 
 
 def circuits(circuit: Circuit, n_poles: int) -> Grouping:

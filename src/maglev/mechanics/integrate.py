@@ -17,6 +17,7 @@ from maglev.mechanics._kernels import passage
 from maglev.mechanics._records import (
     COMPLETED,
     NOT_FINITE,
+    STEP_TOO_LARGE,
     Line,
     MagnetRows,
     Outcome,
@@ -27,9 +28,16 @@ from maglev.mechanics._records import (
 from maglev.mechanics.course import time_step, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
+from maglev.mechanics.linear import Block
 from maglev.mechanics.reduction import ReducedGuideway, reduce
 from maglev.mechanics.responses import Passages, checked_gains
-from maglev.mechanics.step_limit import stability_limit
+from maglev.mechanics.step_limit import (
+    guideway_limit,
+    samples_too_fast,
+    step_holds,
+    train_limit,
+    train_parts,
+)
 from maglev.parameters import Config
 
 Array = npt.NDArray[np.float64]
@@ -48,6 +56,7 @@ class System:
     guidance_places: Places
     grounds: tuple[packing.Ground, packing.Ground]
     line: Line
+    parts: tuple[Block, ...]
     config: Config
 
 
@@ -82,13 +91,8 @@ def prepare(config: Config, profile: Profile) -> System:
         config.passage.mode_cutoff,
         config.passage.mode_cutoff_elsewhere,
     )
-    limit = stability_limit(config, train, reduced)
-    if not time_step(config) < limit:
-        raise ValueError(
-            f"passage.time_step must be below the stability limit of {limit * 1e3:.3g} ms, "
-            f"got {time_step(config) * 1e3:.3g} ms; take a smaller step or lower "
-            "passage.mode_cutoff"
-        )
+    parts = train_parts(config)
+    _check_step(config, reduced, parts)
     _check_reach(config, profile)
     suspension, guidance = (packing.magnet_rows(train, guidance=kind) for kind in (False, True))
     suspension_places, suspension_ground = packing.places(config, suspension, guideway, reduced)
@@ -105,6 +109,7 @@ def prepare(config: Config, profile: Profile) -> System:
         guidance_places=guidance_places._replace(rail=tracks[1][0], ramp=tracks[1][1]),
         grounds=grounds,
         line=packing.line(reduced, config),
+        parts=parts,
         config=config,
     )
 
@@ -119,6 +124,8 @@ def integrate(
     on_progress: Callable[[int], None] | None = None,
 ) -> Passages:
     """Run one passage per row of gains.
+
+    A sample whose gains make a motion grow by the step alone is not judged: its status says so.
 
     A sample's numbers do not depend on its neighbours, on their number or on ``n_threads``.
 
@@ -200,7 +207,21 @@ def integrate(
 
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
         outcomes = list(pool.map(one_row, range(n_rows)))
-    return _gathered(outcomes, n_samples, system, run)
+    too_fast = samples_too_fast(system.parts, gains, run.time_step)
+    return _gathered(outcomes, n_samples, system, run, too_fast)
+
+
+def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ...]) -> None:
+    """Refuse a step at which the guideway, or the train at its mean gains, would grow by itself."""
+    dt, gains = time_step(config), np.array([*config.gains.as_row, *config.gains.further])
+    limit = guideway_limit(config, reduced, dt)
+    if not step_holds(parts, gains, dt):
+        limit = min(limit, train_limit(parts, gains))
+    if not dt < limit:
+        raise ValueError(
+            f"passage.time_step must be below the stability limit of {limit * 1e3:.3g} ms, "
+            f"got {dt * 1e3:.3g} ms; take a smaller step or lower passage.mode_cutoff"
+        )
 
 
 def _check_reach(config: Config, profile: Profile) -> None:
@@ -214,7 +235,13 @@ def _check_reach(config: Config, profile: Profile) -> None:
         )
 
 
-def _gathered(outcomes: list[Outcome], n_samples: int, system: System, run: Run) -> Passages:
+def _gathered(
+    outcomes: list[Outcome],
+    n_samples: int,
+    system: System,
+    run: Run,
+    too_fast: npt.NDArray[np.bool_],
+) -> Passages:
     n_cars = system.vehicle.body_z.size
     n_magnets = system.train.magnets.x.size
 
@@ -225,6 +252,7 @@ def _gathered(outcomes: list[Outcome], n_samples: int, system: System, run: Run)
     status = samples_first("status").astype(np.int64)
     extreme, when = samples_first("extreme").copy(), samples_first("extreme_time").copy()
     status[(status == COMPLETED) & ~np.isfinite(extreme).all(axis=1)] = NOT_FINITE
+    status[too_fast] = STEP_TOO_LARGE
     extreme[status != COMPLETED] = np.nan
     when[status != COMPLETED] = np.nan
     # A lost sample goes on in its row as long as others hold; what it does then means nothing.
@@ -236,6 +264,7 @@ def _gathered(outcomes: list[Outcome], n_samples: int, system: System, run: Run)
     kept = ("gap_min", "gap_max", "current_max")  # in the order of `Outcome.at_loss`
     bounds = np.concatenate([samples_first(name) for name in kept], axis=1)
     bounds = np.where(is_lost[:, None], samples_first("at_loss"), bounds)
+    bounds[too_fast], history[too_fast] = np.nan, np.nan
     at = 4 + 2 * n_cars
     return Passages(
         girder=extreme[:, :4],
@@ -248,8 +277,8 @@ def _gathered(outcomes: list[Outcome], n_samples: int, system: System, run: Run)
         gap_max=bounds[:, 2:4],
         current_max=bounds[:, 4:6],
         status=status,
-        lost_time=lost_time,
-        lost_magnet=samples_first("lost_magnet").astype(np.int64),
+        lost_time=np.where(too_fast, np.nan, lost_time),
+        lost_magnet=np.where(too_fast, -1, samples_first("lost_magnet")).astype(np.int64),
         time=time,
         girder_history=history[:, :4],
         body_z_history=history[:, 4 : 4 + n_cars],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -23,7 +22,7 @@ from maglev.mechanics._records import (
     Vehicle,
 )
 from maglev.mechanics.activity import Stage, stages, stepped_mass, top_stiffness
-from maglev.mechanics.control import grouping
+from maglev.mechanics.control import grouping, late_current
 from maglev.mechanics.course import first_step, n_steps, start, time_step
 from maglev.mechanics.irregularity import Profile, mean_displacement
 from maglev.mechanics.lanes import LANES
@@ -145,16 +144,7 @@ def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: Array) -> L
     group = grouping(circuit.group, n_poles)
     feed = sp.csr_array(group.feed)
     pairs = [np.flatnonzero(row) for row in group.drive]
-    decay, now, before = 0.0, 1.0, 0.0
-    if circuit.lag > 0:
-        part = time_step / circuit.lag
-        decay = math.exp(-part)
-        mean = -math.expm1(-part) / part
-        now, before = 1.0 - mean, mean - decay
-    whole = math.floor(circuit.delay / time_step * (1 + 1e-12))
-    behind = max(0, whole - 1)
-    t = circuit.delay / time_step - behind  # steps before the latest of the three
-    delayed = np.array([(t - 1) * (t - 2) / 2, t * (2 - t), t * (t - 1) / 2])
+    late = late_current(circuit.lag, circuit.delay, time_step)
     kind = 2 if rows.is_guidance else 0
     return Law(
         n_circuits=group.feed.shape[0],
@@ -167,14 +157,14 @@ def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: Array) -> L
         senses=group.feed.any(axis=0).astype(np.int64),
         first=np.array([pair[0] for pair in pairs], dtype=np.int64),
         second=np.array([pair[-1] for pair in pairs], dtype=np.int64),
-        decay=decay,
-        command_now=now,
-        command_before=before,
+        decay=late.decay,
+        command_now=late.now,
+        command_before=late.before,
         delays=circuit.delay > 0,
-        ring=behind + 3,
-        behind=behind,
-        delayed=delayed,
-        undelayed=(float(delayed[0]) if behind == 0 else 0.0) if circuit.delay > 0 else 1.0,
+        ring=late.behind + 3,
+        behind=late.behind,
+        delayed=late.delayed,
+        undelayed=late.undelayed,
         accelerates=bool(np.any(gains[:, 4 + kind])),
         integrates=bool(np.any(gains[:, 5 + kind])),
     )

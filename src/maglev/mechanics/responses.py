@@ -33,7 +33,8 @@ class Passages:
     gap_min, gap_max, current_max : (sample, kind)
         Of suspension and guidance [m, m, A].
     status : (sample,)
-        How the passage ended: 0 completed, 1 contact, 2 gap lost, 3 not finite.
+        How the passage ended: 0 completed, 1 contact, 2 gap lost, 3 not finite, 4 not judged, as
+        the step is too large for the gains.
     lost_time : (sample,)
         When levitation was lost [s]; NaN where it was not.
     lost_magnet : (sample,)

@@ -1,4 +1,8 @@
-"""How long a step of the production solver may be: the limit beyond which a motion grows."""
+"""How long a step of the production solver may be: the limit beyond which a motion grows.
+
+The guideway's limit is that of its modes.  The train's is found from the step itself: the matrix
+that takes the linearised train with its circuits from one step to the next, for any gains.
+"""
 
 from __future__ import annotations
 
@@ -8,57 +12,203 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
+from maglev.mechanics import linear
 from maglev.mechanics import train as train_model
 from maglev.mechanics.activity import top_mass, top_stiffness
-from maglev.mechanics.course import time_step
+from maglev.mechanics.control import late_current
+from maglev.mechanics.linear import Block
 from maglev.mechanics.reduction import ReducedGuideway
 from maglev.parameters import Config
 
 Array = npt.NDArray[np.float64]
 
-
 DAMPING_MARGIN = 1.4
 """Damping ratio of a component mode on its own over that of the guideway's modes, at most [-];
 measured 1.25 with the default parameters."""
-
 
 LINE_MARGIN = 0.92
 """Stable step of the whole guideway over that of its modes, which damping couples, each on its own
 [-]; measured 0.93 or more."""
 
+GROWTH_OF_THE_STEP = 2.0
+"""Growth of a motion by the step alone, beyond that of the train, that makes the step too large
+[1/s]; assumed: in a passage of three seconds a motion then grows by a factor of 400."""
 
-def stability_limit(
-    config: Config, train: train_model.TrainModel, reduced: ReducedGuideway
-) -> float:
-    """Largest stable time step of the production solver's scheme [s].
 
-    Modes of the whole guideway with the mass of a step, made symmetric, those of one car with its
-    magnets closed linearly at the mean gains, and component modes on their own each have a limit
-    that depends on their damping ratio: where the amplification of the scheme passes one
-    (docs/theory/integration.md, eq. 5).
+def guideway_limit(config: Config, reduced: ReducedGuideway, time_step: float) -> float:
+    """Largest step at which no mode of the guideway grows [s].
+
+    Modes of the whole guideway with the mass of a step, made symmetric, and component modes on
+    their own each have a limit that depends on their damping ratio: where the amplification of the
+    scheme passes one (docs/theory/integration.md, eq. 5).
+
+    Parameters
+    ----------
+    config
+        Parameters of everything.
+    reduced
+        Guideway in component coordinates.
+    time_step
+        Δt [s], on which the mass of a step depends.
     """
-    ratio, dt = config.guideway.damping_ratio, time_step(config)
-    square = scipy.linalg.eigvalsh(stepped_stiffness(reduced), stepped_inertia(reduced, dt))[-1]
+    ratio = config.guideway.damping_ratio
+    inertia = stepped_inertia(reduced, time_step)
+    square = scipy.linalg.eigvalsh(stepped_stiffness(reduced), inertia)[-1]
     fastest = math.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes].max(initial=1e-12))
-    limits = [
+    return min(
         LINE_MARGIN * _largest_phase(ratio) / math.sqrt(square),
         _largest_phase(DAMPING_MARGIN * ratio, exact=True) / fastest,
-    ]
-    one_car = train
-    if config.train.n_cars > 1:
-        one_car = train_model.build(config.train.model_copy(update={"n_cars": 1}))
-    stiffness, damping = closed_train(one_car, np.array(config.gains.as_row))
-    n = one_car.mass.size
-    inverse = 1 / one_car.mass[:, None]
-    state = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse * stiffness, -inverse * damping]])
-    poles = scipy.linalg.eigvals(state)
-    size = np.abs(poles)
-    moving = size > 1e-6
-    zeta = np.clip(-poles.real[moving] / size[moving], 0.0, 1.0)
-    ratios = np.linspace(0.0, 1.0, 21)
-    phases = np.interp(zeta, ratios, [_largest_phase(one) for one in ratios])
-    limits.append(float((phases / size[moving]).min()))
-    return min(limits)
+    )
+
+
+def train_parts(config: Config) -> tuple[Block, ...]:
+    """One car of the train, linearised with its circuits, in parts that do not know of one another.
+
+    The fast motions that limit the step are those of single magnets: more cars add none.
+    """
+    one_car = train_model.build(config.train.model_copy(update={"n_cars": 1}))
+    return linear.blocks(one_car, config.control)
+
+
+def train_limit(parts: tuple[Block, ...], gains: Array, least: float = 1e-5) -> float:
+    """Largest step at which no motion of the train grows by the step alone [s].
+
+    Parameters
+    ----------
+    parts
+        From `train_parts`.
+    gains : (8,)
+        Suspension k_p, k_d, guidance k_p, k_d, suspension k_a, k_i, guidance k_a, k_i.
+    least
+        Below this no limit is looked for [s].
+    """
+    stable, too_large = least, 2 * least
+    while step_holds(parts, gains, too_large) and too_large < 0.1:
+        stable, too_large = too_large, 2 * too_large
+    while too_large / stable > 1.01:
+        middle = math.sqrt(stable * too_large)
+        if step_holds(parts, gains, middle):
+            stable = middle
+        else:
+            too_large = middle
+    return stable
+
+
+def step_holds(parts: tuple[Block, ...], gains: Array, time_step: float) -> bool:
+    """Whether no motion of the train grows in a step that does not grow in the train itself."""
+    for block in parts:
+        matrix = _of_use(step_matrix(block, gains, time_step))
+        stepped = np.abs(np.linalg.eigvals(matrix)).max()
+        growth = math.log(stepped) / time_step
+        if growth > GROWTH_OF_THE_STEP and (
+            growth > max(linear.rightmost(block, gains).real, 0.0) + GROWTH_OF_THE_STEP
+        ):
+            return False
+    return True
+
+
+def _of_use(matrix: Array) -> Array:
+    """The matrix without the states that nothing follows from."""
+    while not (kept := matrix.any(axis=0)).all():
+        matrix = matrix[np.ix_(kept, kept)]
+    return matrix
+
+
+def samples_too_fast(
+    parts: tuple[Block, ...], gains: Array, time_step: float
+) -> npt.NDArray[np.bool_]:
+    """Samples whose gains make a motion grow by the step alone.
+
+    The larger a gain the shorter the step must be: a set of samples whose largest gains, all
+    together, pass needs no closer look, and is halved if they do not.
+
+    Parameters
+    ----------
+    parts
+        From `train_parts`.
+    gains : (sample, 8)
+        Of all samples.
+    time_step
+        Δt [s].
+
+    Returns
+    -------
+    too_fast : (sample,)
+        True where the step is too large.
+    """
+    too_fast = np.zeros(gains.shape[0], dtype=bool)
+    waiting = [np.arange(gains.shape[0])]
+    while waiting:
+        which = waiting.pop()
+        if step_holds(parts, gains[which].max(axis=0), time_step):
+            continue
+        if which.size == 1 or not step_holds(parts, gains[which].min(axis=0), time_step):
+            too_fast[which] = True
+            continue
+        spread = np.ptp(gains[which], axis=0) / np.maximum(gains[which].max(axis=0), 1e-12)
+        order = which[np.argsort(gains[which, int(spread.argmax())], kind="stable")]
+        waiting += [order[: which.size // 2], order[which.size // 2 :]]
+    return too_fast
+
+
+def step_matrix(block: Block, gains: Array, time_step: float) -> Array:
+    """Matrix that takes a block of the linearised train from one step to the next.
+
+    The state is displacement, velocity half a step before, and the accelerations of the last two
+    steps; of the magnets' freedoms also what the circuits remember: the integral and the error, the
+    command and the current where they lag, and the signals of the steps within the delay.  A
+    circuit's gain on the acceleration acts on that of the same step.
+
+    Parameters
+    ----------
+    block
+        Part of the train.
+    gains : (8,)
+        As in `train_limit`.
+    time_step
+        Δt [s].
+
+    References
+    ----------
+    docs/theory/integration.md, step; docs/theory/control.md.
+    """
+    n, dt = block.mass.size, time_step
+    late = [late_current(loop.lag, loop.delay, dt) for loop in block.loops]
+    fed = [loop.fed_by for loop in block.loops]
+    remembered = [one.size * (4 + way.behind + 3) for one, way in zip(fed, late, strict=True)]
+    n_state = 4 * n + sum(remembered)
+    unit = np.eye(n_state)
+    x, v, a, before = (unit[k * n : (k + 1) * n] for k in range(4))
+    new_v = v + dt * a
+    new_x = x + dt * new_v
+    predicted = new_v + dt * (a - 0.5 * before)
+    force = -block.stiffness @ new_x - block.damping @ predicted
+    inertia = np.diag(block.mass)
+    rows, start = [], 4 * n
+    for kind, (loop, way, freedoms) in enumerate(zip(block.loops, late, fed, strict=True)):
+        m = freedoms.size
+        memory = unit[start : start + remembered[kind]].reshape(way.behind + 7, m, n_state)
+        start += remembered[kind]
+        k_p, k_d, k_a, k_i = linear.of_kinds(gains)[kind]
+        integral = memory[0] + 0.5 * dt * (memory[1] + new_x[freedoms])
+        signal = k_p * new_x[freedoms] + k_d * predicted[freedoms] + k_i * integral
+        # without the acceleration of this step, which joins on the left; `direct` is its share
+        signals = [signal, memory[4] + k_a * a[freedoms], *memory[5:-1]]
+        command = sum(
+            weight * signals[way.behind + j] for j, weight in enumerate(way.delayed) if weight
+        )
+        current = way.decay * memory[3] + way.before * memory[2] + way.now * command
+        force = force - loop.pull @ current
+        inertia[:, freedoms] += k_a * way.direct * loop.pull
+        rows.append((freedoms, way, k_a, [integral, new_x[freedoms], command, current, *signals]))
+    acceleration = np.linalg.solve(inertia, force)
+    memories = []
+    for freedoms, way, k_a, memory in rows:
+        answered = k_a * acceleration[freedoms]
+        memory[2] = memory[2] + way.undelayed * answered
+        memory[3] = memory[3] + way.direct * answered
+        memories += memory
+    return np.concatenate([new_x, new_v, acceleration, a, *memories])
 
 
 def _largest_phase(ratio: float, *, exact: bool = False) -> float:
@@ -130,36 +280,3 @@ def step_response(reduced: ReducedGuideway, time_step: float) -> Array:
     omega = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes])
     response[: reduced.n_modes] = np.sinc(omega * time_step / (2 * np.pi)) ** 2
     return response
-
-
-def closed_train(train: train_model.TrainModel, gains: Array) -> tuple[Array, Array]:
-    """Stiffness and damping of the train with its magnets closed linearly over a rigid track.
-
-    Parameters
-    ----------
-    train
-        Train with open magnets.
-    gains : (4,)
-        Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d.
-
-    Returns
-    -------
-    stiffness, damping : (dof, dof)
-        Each pole adds 2F₀(k_p/i₀ − 1/δ₀) and 2F₀ k_d/i₀ at its place.
-    """
-    stiffness, damping = train.stiffness.toarray(), train.damping.toarray()
-    from maglev.mechanics.packing import magnet_rows
-
-    for guidance in (False, True):
-        rows = magnet_rows(train, guidance=guidance)
-        k_p, k_d = gains[2 * guidance], gains[2 * guidance + 1]
-        current, gap = rows.current_reference, rows.gap_reference
-        force = rows.constant * (current / gap) ** 2
-        shapes = np.stack([np.ones_like(rows.arm), rows.arm])  # (translation or rotation, pole)
-        for row, side in np.ndindex(rows.number.shape):
-            dof = np.array([rows.translation[row, side], rows.rotation[row, side]])
-            at = np.ix_(dof, dof)
-            pull = 2 * (shapes * force[row, side]) @ shapes.T
-            stiffness[at] += pull * (k_p / current - 1 / gap)
-            damping[at] += pull * (k_d / current)
-    return stiffness, damping
