@@ -33,6 +33,7 @@ from maglev.mechanics.reduction import ReducedGuideway, reduce
 from maglev.mechanics.responses import Passages, checked_gains
 from maglev.mechanics.step_limit import (
     guideway_limit,
+    safe_gains,
     samples_too_fast,
     step_holds,
     train_limit,
@@ -57,6 +58,7 @@ class System:
     grounds: tuple[packing.Ground, packing.Ground]
     line: Line
     parts: tuple[Block, ...]
+    safe_gains: Array
     config: Config
 
 
@@ -110,6 +112,7 @@ def prepare(config: Config, profile: Profile) -> System:
         grounds=grounds,
         line=packing.line(reduced, config),
         parts=parts,
+        safe_gains=safe_gains(parts, _mean_gains(config), time_step(config)),
         config=config,
     )
 
@@ -207,13 +210,13 @@ def integrate(
 
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
         outcomes = list(pool.map(one_row, range(n_rows)))
-    too_fast = samples_too_fast(system.parts, gains, run.time_step)
+    too_fast = samples_too_fast(system.parts, gains, run.time_step, system.safe_gains)
     return _gathered(outcomes, n_samples, system, run, too_fast)
 
 
 def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ...]) -> None:
     """Refuse a step at which the guideway, or the train at its mean gains, would grow by itself."""
-    dt, gains = time_step(config), np.array([*config.gains.as_row, *config.gains.further])
+    dt, gains = time_step(config), _mean_gains(config)
     limit = guideway_limit(config, reduced, dt)
     if not step_holds(parts, gains, dt):
         limit = min(limit, train_limit(parts, gains))
@@ -222,6 +225,10 @@ def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ..
             f"passage.time_step must be below the stability limit of {limit * 1e3:.3g} ms, "
             f"got {dt * 1e3:.3g} ms; take a smaller step or lower passage.mode_cutoff"
         )
+
+
+def _mean_gains(config: Config) -> Array:
+    return np.array([*config.gains.as_row, *config.gains.further])
 
 
 def _check_reach(config: Config, profile: Profile) -> None:
