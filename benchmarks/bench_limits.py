@@ -22,11 +22,11 @@ import xarray as xr
 
 from maglev import datasets
 from maglev.config import load_config
-from maglev.datasets import RESPONSES
 from maglev.figures import style
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
 from maglev.stages import accuracy, design, points
+from maglev.vocabulary import RESPONSES
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "benchmarks" / "results"

@@ -19,6 +19,21 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from maglev.vocabulary import (
+    DECISIONS,
+    DENSITY_METHODS,
+    GAIN_UNITS,
+    GAINS,
+    LIMIT_STATUS,
+    METHODS,
+    RESPONSE_UNITS,
+    RESPONSE_WORDS,
+    RESPONSES,
+    SOURCES,
+    STATUS,
+    SURROGATES,
+)
+
 CONVENTIONS = "CF-1.11"
 REFERENCES = (
     "Dynamic reliability of a high-speed EMS maglev train on a guideway bridge by an adaptive "
@@ -26,53 +41,6 @@ REFERENCES = (
     "(2024), doi 10.1177/14613484241279033"
 )
 AXES = "x along travel from the first pier, y to the right, z down; SI units"
-
-RESPONSES = (
-    "girder_displacement_z",
-    "girder_displacement_y",
-    "girder_acceleration_z",
-    "girder_acceleration_y",
-    "car_body_acceleration_z",
-    "car_body_acceleration_y",
-)
-"""The six responses whose extremes a passage is judged by."""
-
-GAINS = (
-    "suspension_proportional_gain",
-    "suspension_derivative_gain",
-    "guidance_proportional_gain",
-    "guidance_derivative_gain",
-)
-"""The four gains, in the order of the columns of the array that `simulate` takes."""
-
-
-METHODS = ("mcm", "osm", "asm_paper", "asm")
-"""The methods by which the runs of a case are chosen."""
-
-SURROGATES = ("rbf", "scaled_rbf", "kriging")
-"""The kinds of surrogate."""
-
-DECISIONS = (
-    "go_on",
-    "error_below_threshold",
-    "limits_settled",
-    "largest_number_of_runs",
-)
-"""What is decided after a round of an adaptive design."""
-
-LIMIT_STATUS = ("given", "too_few_exceedances", "infinite")
-"""What can be said of a limit."""
-
-DENSITY_METHODS = ("gdee", "gdee_of_the_logarithm", "direct")
-"""How a density was found: by the GDEE; by the GDEE of the logarithm of the extreme, where strays
-ask for too fine a mesh; directly, where there is no GDEE or it refused both."""
-
-SOURCES = ("paper", "ours")
-"""Whose number stands there."""
-
-TRACK_PARTS = ("gains_only", "track_only", "other_track", "other_gains")
-"""Further runs of a case whose baseline has gains i on track i: gains i on the configured track;
-mean gains on track i; gains i on track n + i; gains n + i on track i (n samples)."""
 
 OF_RESPONSE = "of the response"
 """In place of a unit: that of the response along ``response``, see `RESPONSE_UNITS`."""
@@ -121,25 +89,6 @@ class Variable:
             "flag_values": np.array(list(self.flags), dtype=self.dtype),
             "flag_meanings": " ".join(self.flags.values()),
         }
-
-
-STATUS = {0: "completed", 1: "contact", 2: "gap_lost", 3: "not_finite"}
-"""How a passage ended: levitated throughout, or why it stopped."""
-
-_GIRDER = "of the girder at midspan of the middle span"
-_CAR = "of the car body, largest over the cars"
-_QUANTITY = {
-    "girder_displacement_z": ("m", f"vertical displacement {_GIRDER}"),
-    "girder_displacement_y": ("m", f"lateral displacement {_GIRDER}"),
-    "girder_acceleration_z": ("m s-2", f"vertical acceleration {_GIRDER}"),
-    "girder_acceleration_y": ("m s-2", f"lateral acceleration {_GIRDER}"),
-    "car_body_acceleration_z": ("m s-2", f"vertical acceleration {_CAR}"),
-    "car_body_acceleration_y": ("m s-2", f"lateral acceleration {_CAR}"),
-}
-
-
-RESPONSE_UNITS: Mapping[str, str] = {name: _QUANTITY[name][0] for name in RESPONSES}
-"""Unit of each response in the notation of UDUNITS."""
 
 
 def _table() -> dict[str, Variable]:
@@ -210,11 +159,12 @@ def _table() -> dict[str, Variable]:
             dtype="int32",
         ),
     }
-    for name, unit in zip(GAINS, ("A m-1", "A s m-1") * 2, strict=True):
+    for name, unit in GAIN_UNITS.items():
         table[name] = Variable(
             dims=("sample",), units=unit, long_name=f"{name.replace('_', ' ')} of the magnets"
         )
-    for name, (unit, meaning) in _QUANTITY.items():
+    for name, meaning in RESPONSE_WORDS.items():
+        unit = RESPONSE_UNITS[name]
         table[name] = Variable(
             dims=("sample",), units=unit, long_name=f"largest absolute {meaning}"
         )

@@ -13,8 +13,8 @@ from formula_train import FormulaTrain, config, made
 from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev import datasets
-from maglev.datasets import DECISIONS, RESPONSES
 from maglev.stages import design, points, runs
+from maglev.vocabulary import DECISIONS, RESPONSES
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import xarray as xr
 from formula_train import FormulaTrain, config, in_a_process, made, written
 from numpy.testing import assert_array_equal
 
-from maglev import datasets, simulate
+from maglev import datasets, simulate, vocabulary
 from maglev.config import from_mapping
 from maglev.stages import points, runs
 from maglev.stages.runs import stored_runs
@@ -115,7 +115,7 @@ def test_parts_of_a_random_track_share_gains_and_tracks(train, tmp_path):
     parameters = config()
     both = made(parameters, "mcm", tmp_path, case="moving")
     part = {name: runs.track_part(parameters, "moving", name, tmp_path)
-            for name in datasets.TRACK_PARTS}  # fmt: skip
+            for name in vocabulary.TRACK_PARTS}  # fmt: skip
     for one in part.values():
         datasets.check(datasets.describe(one), "runs")
         assert one.sizes["sample"] == 6

@@ -7,15 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import binom, norm
 from synthetic import BORDER, CONFIG, P_LOST
 
-from maglev.datasets import (
-    DENSITY_METHODS,
-    LIMIT_STATUS,
-    METHODS,
-    RESPONSES,
-    SURROGATES,
-    check,
-    describe,
-)
+from maglev.datasets import check, describe
 from maglev.stages import (
     accuracy,
     density,
@@ -28,7 +20,7 @@ from maglev.stages import (
     tables,
     track_split,
 )
-from maglev.uncertainty.selection import KINDS
+from maglev.vocabulary import DENSITY_METHODS, LIMIT_STATUS, METHODS, RESPONSES
 
 LEVELS = np.array(CONFIG.study.failure_probability)
 
@@ -55,10 +47,6 @@ def held():
 def losing():
     """The files of a design with lost runs."""
     return chain(n=100, loses=True)
-
-
-def test_kinds_have_one_order_in_files_and_package():
-    assert SURROGATES == KINDS
 
 
 @pytest.mark.parametrize("name", ["surrogate", "eev", "density", "limits"])

@@ -10,9 +10,6 @@ from scipy import stats
 
 from maglev.uncertainty.gdee import evolved_density
 from maglev.uncertainty.reliability import (
-    BEYOND_SAMPLE,
-    GIVEN,
-    LOST,
     density_distance,
     density_exceedance,
     error_range_near,
@@ -24,6 +21,7 @@ from maglev.uncertainty.reliability import (
     wasserstein_distance,
     weighted_limits,
 )
+from maglev.vocabulary import GIVEN, INFINITE, TOO_FEW
 
 SAMPLE = np.random.default_rng(42).normal(size=2000)
 VALUES = hnp.arrays(float, st.integers(1, 12), elements=st.floats(-5, 5))
@@ -99,21 +97,21 @@ def test_intervals_hold_the_limit_as_often_as_they_say():
 
 def test_a_level_beyond_the_sample_is_said_to_be_so():
     found = sample_limits(SAMPLE, [1e-2, 4.8e-3, 4.7e-3, 1e-3])
-    assert found.status == (GIVEN, GIVEN, BEYOND_SAMPLE, BEYOND_SAMPLE)
+    assert found.status == (GIVEN, GIVEN, TOO_FEW, TOO_FEW)
     assert_allclose(found.expected_exceedances, [20.0, 9.6, 9.4, 2.0])
     for numbers in (found.limit, found.lower, found.upper):
         assert_array_equal(np.isnan(numbers), [False, False, True, True])
     # a thousandth of the weight on most of the points: their size does not count
     weights = np.where(np.arange(2000) < 500, 1.0, 1e-3)
     lopsided = weighted_limits(SAMPLE, weights / weights.sum(), [0.1, 1e-2])
-    assert lopsided.status == (GIVEN, BEYOND_SAMPLE)
+    assert lopsided.status == (GIVEN, TOO_FEW)
 
 
 def test_lost_samples_stand_above_every_held_one():
     lost = sample_limits(SAMPLE[:1990], [0.1, 0.05, 0.012, 0.005, 0.001], n_lost=10)
     as_largest = np.sort(np.append(SAMPLE[:1990], np.full(10, 1e9)))
     assert_array_equal(lost.limit[:2], as_largest[[1799, 1899]])
-    assert lost.status == (GIVEN, GIVEN, GIVEN, LOST, LOST)
+    assert lost.status == (GIVEN, GIVEN, GIVEN, INFINITE, INFINITE)
     # with ten or so held samples expected beyond, the interval may reach into the lost ones
     assert sample_limits(SAMPLE[:1990], [0.0101], n_lost=10).upper[0] < np.inf
     assert sample_limits(SAMPLE[:1970], [0.0205], n_lost=30).upper[0] == np.inf
@@ -122,7 +120,7 @@ def test_lost_samples_stand_above_every_held_one():
     )
     assert_array_equal(weighted.limit, lost.limit[:2])
     gone = weighted_limits(SAMPLE, np.full(2000, 1 / 2000), [0.1, 0.01], lost_probability=0.01)
-    assert gone.status == (GIVEN, LOST)
+    assert gone.status == (GIVEN, INFINITE)
 
 
 def test_a_surrogate_without_error_has_the_limits_of_its_predictions():

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from maglev.datasets import METHODS
 from maglev.figures import labels, style
+from maglev.vocabulary import METHODS
 
 AIM = 0.1
 """Error that counts as good, in standard deviations."""

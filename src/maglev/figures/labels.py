@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from maglev.datasets import GAINS, METHODS, RESPONSES
+from maglev.vocabulary import GAINS, METHODS, RESPONSES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,12 +54,12 @@ SHOWN = tuple(
         ("car-body acceleration, lat.", "acceleration", _ACCELERATION),
     )
 )
-"""How each response is shown, in the order of `maglev.datasets.RESPONSES`."""
+"""How each response is shown, in the order of `maglev.vocabulary.RESPONSES`."""
 
 assert len(SHOWN) == len(RESPONSES)
 
 GAIN = ("suspension $k_p$", "suspension $k_d$", "guidance $k_p$", "guidance $k_d$")
-"""The gains in short, in the order of `maglev.datasets.GAINS`."""
+"""The gains in short, in the order of `maglev.vocabulary.GAINS`."""
 
 GAIN_COLOUR = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00")
 """Their colours: suspension blue, guidance orange."""

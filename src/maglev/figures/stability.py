@@ -7,8 +7,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from maglev.datasets import STATUS
 from maglev.figures import labels, style
+from maglev.vocabulary import STATUS
 
 _LOST = "#D55E00"
 _MARKERS = {1: "x", 2: "+", 3: "*"}

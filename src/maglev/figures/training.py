@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from maglev.datasets import METHODS, RESPONSES
 from maglev.figures import curves, labels, style
+from maglev.vocabulary import METHODS, RESPONSES
 
 _SHOWN = ("girder_displacement_z", "girder_acceleration_z")
 

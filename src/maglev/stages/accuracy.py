@@ -8,12 +8,12 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import METHODS, RESPONSES
 from maglev.parameters import Config
 from maglev.stages.extremes import coordinates, extremes, lost, method_number
 from maglev.stages.limits import baseline_limits
 from maglev.stages.surrogate import predictor
 from maglev.uncertainty.reliability import sample_limits
+from maglev.vocabulary import METHODS, RESPONSES
 
 _LOG = logging.getLogger(__name__)
 

@@ -8,13 +8,14 @@ import numpy as np
 import xarray as xr
 from scipy import stats
 
-from maglev.datasets import DENSITY_METHODS, RESPONSES
+from maglev.arrays import FloatArray
 from maglev.parameters import Config
-from maglev.stages.extremes import FloatArray, coordinates, extremes, lost
+from maglev.stages.extremes import coordinates, extremes, lost
 from maglev.stages.surrogate import loss_comment, stored_predictor
 from maglev.uncertainty.gdee import density_with_strays, direct_density, silverman_bandwidth
 from maglev.uncertainty.reliability import error_range_near, exceedance
 from maglev.uncertainty.samples import held_part
+from maglev.vocabulary import DENSITY_METHODS, RESPONSES
 
 _LOG = logging.getLogger(__name__)
 

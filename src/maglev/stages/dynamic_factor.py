@@ -29,6 +29,7 @@ from maglev.simulation import simulate
 from maglev.stages import config_slice
 from maglev.stages.deflection import load_per_length
 from maglev.stages.modes import euler_span
+from maglev.vocabulary import STATUS
 
 _LOG = logging.getLogger(__name__)
 
@@ -127,7 +128,7 @@ def dataset(config: Config, store: str | Path, n_threads: int = 1) -> xr.Dataset
             lost.size,
             sweep.size,
             3.6 * sweep[lost[0]],
-            datasets.STATUS[int(status[lost[0]])],
+            STATUS[int(status[lost[0]])],
         )
     factors = [dynamic_factor(beam, config.train.length, float(speed)) for speed in sweep]
     result = xr.Dataset(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import xarray as xr
 
-from maglev.datasets import GAINS
 from maglev.parameters import Config
 from maglev.stages.extremes import coordinates
 from maglev.stages.surrogate import stored_predictor
+from maglev.vocabulary import GAINS
 
 
 def dataset(

@@ -9,14 +9,13 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.stats import norm
 
-from maglev.datasets import GAINS, METHODS, RESPONSES
+from maglev.arrays import BoolArray, FloatArray
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import sobol_points
+from maglev.vocabulary import GAINS, METHODS, RESPONSES
 
-FloatArray = npt.NDArray[np.float64]
 
-
-def lost(runs: xr.Dataset) -> npt.NDArray[np.bool_]:
+def lost(runs: xr.Dataset) -> BoolArray:
     """Which samples of a set of runs (sample,) have lost levitation."""
     return runs["status"].to_numpy() != 0
 

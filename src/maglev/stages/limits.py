@@ -9,24 +9,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import LIMIT_STATUS, RESPONSES
+from maglev.arrays import FloatArray
 from maglev.parameters import Config
 from maglev.stages.density import binomial_interval
-from maglev.stages.extremes import FloatArray, coordinates, extremes, lost, population
+from maglev.stages.extremes import coordinates, extremes, lost, population
 from maglev.stages.surrogate import loss_comment, stored_predictor
 from maglev.uncertainty.reliability import (
-    BEYOND_SAMPLE,
-    GIVEN,
-    LOST,
     Limits,
     error_range_near,
     sample_limits,
     surrogate_limits,
 )
+from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
 
 _LOG = logging.getLogger(__name__)
-
-_STATUS = {GIVEN: "given", BEYOND_SAMPLE: "too_few_exceedances", LOST: "infinite"}
 
 
 def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
@@ -182,7 +178,7 @@ def _surrogate_limits(
 
 def status_numbers(limits: Limits) -> list[int]:
     """What can be said of each limit, as the code of a file (level,)."""
-    return [LIMIT_STATUS.index(_STATUS[status]) for status in limits.status]
+    return [LIMIT_STATUS.index(status) for status in limits.status]
 
 
 def _dataset(
@@ -198,7 +194,7 @@ def _dataset(
     columns: dict[str, tuple[tuple[str, ...], np.ndarray]] = {}
     for name, of in (("limit", limits), ("held_limit", held_limits)):
         status = np.array([status_numbers(one) for one in of])
-        infinite = status == LIMIT_STATUS.index("infinite")
+        infinite = status == LIMIT_STATUS.index(INFINITE)
         for end, suffix in (("limit", ""), ("lower", "_low"), ("upper", "_high")):
             values = np.array([getattr(one, end) for one in of])
             if end != "lower":  # losses alone are likelier: no finite limit, no upper end
@@ -207,7 +203,7 @@ def _dataset(
         columns[f"{name}_status"] = (level, status)
     for response, name in enumerate(RESPONSES):
         said = [
-            f"{p:g}: {value:.4g}" if code == 0 else f"{p:g}: {LIMIT_STATUS[code]}"
+            f"{p:g}: {value:.4g}" if LIMIT_STATUS[code] == GIVEN else f"{p:g}: {LIMIT_STATUS[code]}"
             for p, value, code in zip(
                 config.study.failure_probability,
                 columns["limit"][1][response],

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import DECISIONS, METHODS, RESPONSES, SOURCES
 from maglev.stages.extremes import lost
 from maglev.stages.tables import markdown, number
+from maglev.vocabulary import DECISIONS, METHODS, RESPONSES, SOURCES
 
 RESPONSE = "girder_displacement_z"
 """The response that the paper's surviving numbers speak of."""

@@ -14,12 +14,11 @@ import numpy.typing as npt
 import xarray as xr
 from scipy.stats import norm
 
-from maglev.datasets import GAINS
+from maglev.arrays import FloatArray, IntArray
 from maglev.parameters import Case, Config
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import PointSet, gf_discrepancy, gf_points, sobol_points
-
-FloatArray = npt.NDArray[np.float64]
+from maglev.vocabulary import GAINS
 
 
 def generator(seed: int, *key: str | int) -> np.random.Generator:
@@ -41,7 +40,7 @@ def case_of(config: Config, name: str) -> Case:
     return config.cases[name]
 
 
-def random_columns(case: Case) -> npt.NDArray[np.int64]:
+def random_columns(case: Case) -> IntArray:
     """Columns (parameter,) of the random gains in an array of all four, in rising order."""
     return np.flatnonzero([name.removesuffix("_gain") in case.random_gains for name in GAINS])
 
@@ -59,7 +58,7 @@ def marginals(config: Config, case: str) -> Marginals:
     Returns
     -------
     marginals
-        One distribution per random gain, in the order of `maglev.datasets.GAINS`.
+        One distribution per random gain, in the order of `maglev.vocabulary.GAINS`.
 
     Raises
     ------
@@ -109,7 +108,7 @@ def baseline(config: Config, case: str, n: int, stream: str = "baseline") -> Flo
     return generator(config.seed, stream).standard_normal(shape)
 
 
-def track_seeds(config: Config, n: int, stream: str = "track") -> npt.NDArray[np.int64]:
+def track_seeds(config: Config, n: int, stream: str = "track") -> IntArray:
     """Seeds (sample,) of the irregularities that the samples meet; seed i does not depend on n."""
     return generator(config.seed, stream).integers(0, 2**31, size=n)
 

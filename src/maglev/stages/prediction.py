@@ -8,10 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import METHODS
 from maglev.parameters import Config
 from maglev.stages.extremes import coordinates, extremes, lost, method_number
 from maglev.stages.surrogate import stored_predictor
+from maglev.vocabulary import METHODS
 
 _LOG = logging.getLogger(__name__)
 

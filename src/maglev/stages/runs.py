@@ -22,11 +22,12 @@ import numpy.typing as npt
 import xarray as xr
 
 from maglev import datasets
-from maglev.datasets import GAINS, TRACK_PARTS
+from maglev.arrays import FloatArray, IntArray
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
 from maglev.simulation import simulate
 from maglev.stages.points import baseline, case_of, gains_at, n_samples, random_columns, track_seeds
+from maglev.vocabulary import GAINS, TRACK_PARTS
 
 _LOG = logging.getLogger(__name__)
 
@@ -68,7 +69,7 @@ def folder_of(config: Config, store: str | Path) -> Path:
     return Path(store) / "runs" / key_of(content(config), _code())
 
 
-def _row_keys(gains: npt.NDArray[np.float64], seeds: npt.NDArray[np.int64] | None) -> list[bytes]:
+def _row_keys(gains: FloatArray, seeds: IntArray | None) -> list[bytes]:
     """What each run is found by: the bytes of its gains, and of its track seed if it has one."""
     keys = [row.tobytes() for row in np.ascontiguousarray(gains, dtype="<f8")]
     if seeds is None:
@@ -167,8 +168,8 @@ def stored_runs(
 
 def _compute(
     config: Config,
-    gains: npt.NDArray[np.float64],
-    seeds: npt.NDArray[np.int64] | None,
+    gains: FloatArray,
+    seeds: IntArray | None,
     folder: Path,
     n_threads: int,
 ) -> Path:
@@ -205,11 +206,11 @@ def _gathered(places: Sequence[tuple[Path, int]]) -> xr.Dataset:
 def runs(
     config: Config,
     case: str,
-    standard: npt.NDArray[np.float64],
-    probability: npt.NDArray[np.float64],
+    standard: FloatArray,
+    probability: FloatArray,
     store: str | Path,
     *,
-    track_seeds: npt.NDArray[np.int64] | None = None,
+    track_seeds: IntArray | None = None,
     n_threads: int = 1,
 ) -> xr.Dataset:
     """Runs of a case at standardised points.
@@ -346,8 +347,8 @@ def track_part(
     case
         Name of a case with a random track.
     part
-        One of `maglev.datasets.TRACK_PARTS`; its sample i has the gains or the track of sample i of
-        the baseline.
+        One of `maglev.vocabulary.TRACK_PARTS`; its sample i has the gains or the track of
+        sample i of the baseline.
     store
         Folder of the store.
     n_threads

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import LIMIT_STATUS, METHODS, RESPONSES
+from maglev.arrays import FloatArray
 from maglev.parameters import Config
 from maglev.stages.density import binomial_interval
-from maglev.stages.extremes import FloatArray, extremes, lost
+from maglev.stages.extremes import extremes, lost
 from maglev.stages.limits import baseline_limits, status_numbers
+from maglev.vocabulary import LIMIT_STATUS, METHODS, RESPONSES
 
 _LOG = logging.getLogger(__name__)
 

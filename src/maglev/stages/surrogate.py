@@ -9,19 +9,13 @@ import numpy as np
 import xarray as xr
 from scipy import stats
 
-from maglev.datasets import SURROGATES
+from maglev.arrays import FloatArray
 from maglev.parameters import Config
-from maglev.stages.extremes import (
-    FloatArray,
-    coordinates,
-    extremes,
-    generator,
-    lost,
-    population,
-)
+from maglev.stages.extremes import coordinates, extremes, generator, lost, population
 from maglev.uncertainty.failure_region import Loss, learnt_loss
 from maglev.uncertainty.selection import Selected, fit_selected, rebuilt
 from maglev.uncertainty.surrogate import relative_error
+from maglev.vocabulary import SURROGATES
 
 _LOG = logging.getLogger(__name__)
 

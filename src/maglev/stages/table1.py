@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import LIMIT_STATUS, METHODS, RESPONSE_UNITS, RESPONSES
 from maglev.stages.extremes import coordinates, method_number
 from maglev.stages.tables import markdown, number
+from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, METHODS, RESPONSE_UNITS, RESPONSES
 
 _OF_METHOD = tuple(
     f"{name}{end}" for name in ("limit", "held_limit") for end in ("", "_low", "_high", "_status")
@@ -142,9 +142,9 @@ def text(table: xr.Dataset, heading: str) -> str:
 def _cell(row: Mapping[str, object], prefix: str) -> str:
     """A limit with its interval, or why there is none."""
     status = row[f"{prefix}status"]
-    if status == "infinite":
+    if status == INFINITE:
         return "none, losses are likelier"
-    if status != "given":
+    if status != GIVEN:
         return str(status).replace("_", " ")
     limit, low, high = (number(row[f"{prefix}limit{end}"]) for end in ("", "_low", "_high"))
     return f"{limit} [{low}, {high}]"

@@ -8,13 +8,13 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import RESPONSES
 from maglev.parameters import Config
 from maglev.stages.density import places
 from maglev.stages.extremes import coordinates, extremes, generator, lost
 from maglev.uncertainty.gdee import direct_density, silverman_bandwidth
 from maglev.uncertainty.samples import held_part
 from maglev.uncertainty.shares import pick_freeze_shares
+from maglev.vocabulary import RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -31,7 +31,7 @@ def dataset(config: Config, both: xr.Dataset, parts: Mapping[str, xr.Dataset]) -
     both
         Layout ``runs``: gains i on track i.
     parts
-        Layout ``runs``, as many samples, by the names of `maglev.datasets.TRACK_PARTS`.
+        Layout ``runs``, as many samples, by the names of `maglev.vocabulary.TRACK_PARTS`.
 
     Returns
     -------

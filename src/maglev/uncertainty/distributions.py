@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import rv_continuous
 
+from maglev.arrays import FloatArray
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from scipy.stats.distributions import rv_frozen
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

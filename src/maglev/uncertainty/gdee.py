@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import gaussian_kde
 
+from maglev.arrays import FloatArray
 from maglev.uncertainty import _kernels
 from maglev.uncertainty.samples import (
-    FloatArray,
     check_lost_probability,
     checked_probability,
     effective_size,

@@ -12,12 +12,8 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from maglev.uncertainty.surrogate import (
-    Array,
-    Surrogate,
-    SurrogateWithDeviation,
-    checked_points,
-)
+from maglev.arrays import FloatArray, IntArray
+from maglev.uncertainty.surrogate import Surrogate, SurrogateWithDeviation, checked_points
 
 AGGREGATES = ("sum", "maximum")
 """How the scores of several responses become one: summed, or the largest."""
@@ -42,7 +38,7 @@ assumed, a hundred times the nugget of the Kriging."""
 
 def taylor_scores(
     distance: npt.ArrayLike, remainder: npt.ArrayLike, diameter: float, aggregate: str = "sum"
-) -> Array:
+) -> FloatArray:
     """Score J = D/max D + w R/max R with w = 1 − D/L, of several responses at once.
 
     Parameters
@@ -85,7 +81,7 @@ def taylor_scores(
     return score.sum(axis=1) if aggregate == "sum" else score.max(axis=1)
 
 
-def taylor_remainder(surrogate: Surrogate, candidates: npt.ArrayLike) -> Array:
+def taylor_remainder(surrogate: Surrogate, candidates: npt.ArrayLike) -> FloatArray:
     """Difference between the surrogate and its tangent at the nearest training point.
 
     R = |ŷ(c) − [Y_nn + ∇ŷ(u_nn)ᵀ(c − u_nn)]|.
@@ -127,8 +123,8 @@ def taylor_batch(
     *,
     aggregate: str = "sum",
     held_probability: npt.ArrayLike | None = None,
-    scores: Array | None = None,
-) -> npt.NDArray[np.int64]:
+    scores: FloatArray | None = None,
+) -> IntArray:
     """Candidates of the largest score J, one after another.
 
     After each choice the remainder of the chosen candidate is zero and it counts as a sample for
@@ -187,7 +183,7 @@ def predicted_limits(
     values: npt.ArrayLike,
     exceedances: Sequence[float],
     held_probability: npt.ArrayLike | None = None,
-) -> Array:
+) -> FloatArray:
     """Limits of a predicted sample in which every point may be lost.
 
     The smallest y with mean(1 − h) + mean(h · I{Y > y}) ≤ P; infinite if losses alone exceed P.
@@ -234,8 +230,8 @@ def tail_batch(
     aggregate: str = "sum",
     exceedances: Sequence[float] = EXCEEDANCES,
     held_probability: npt.ArrayLike | None = None,
-    scores: Array | None = None,
-) -> npt.NDArray[np.int64]:
+    scores: FloatArray | None = None,
+) -> IntArray:
     """Candidates that most reduce the variance of the surrogate where the limits are decided.
 
     Every limit of every response is a target.  Its neighbourhood is a set of nodes, drawn from the
@@ -314,7 +310,7 @@ def tail_batch(
         for response, nodes in targets
     ]
     variance = deviation[pool].T ** 2  # (response, pool)
-    rows: list[list[Array]] = [[] for _ in scale]
+    rows: list[list[FloatArray]] = [[] for _ in scale]
     free = np.ones(pool.size, dtype=bool)
     chosen = np.empty(n_new, dtype=np.int64)
     for place in range(n_new):
@@ -348,7 +344,7 @@ CRITERIA = {"taylor": taylor_batch, "tail": tail_batch}
 """Criteria by the name they have in a configuration."""
 
 
-def _weighted_limits(values: Array, levels: Array, weight: Array) -> Array:
+def _weighted_limits(values: FloatArray, levels: FloatArray, weight: FloatArray) -> FloatArray:
     """Smallest value (level, response) beyond which no more than ``levels`` of ``weight`` lies."""
     limits = np.empty((levels.size, values.shape[1]))
     for response in range(values.shape[1]):
@@ -363,7 +359,7 @@ def _weighted_limits(values: Array, levels: Array, weight: Array) -> Array:
     return limits
 
 
-def _nodes(excess: Array, deviation: Array, spread: float, held: Array) -> npt.NDArray[np.int64]:
+def _nodes(excess: FloatArray, deviation: FloatArray, spread: float, held: FloatArray) -> IntArray:
     """Candidates (node,) that stand for the neighbourhood of a limit, by systematic sampling."""
     width = np.hypot(deviation, BAND * spread)
     weight = held * np.exp(-0.5 * (excess / width) ** 2) / width
@@ -377,7 +373,7 @@ def _checked(
     candidates: npt.ArrayLike,
     n_new: int,
     held_probability: npt.ArrayLike | None,
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Samples, candidates, their probability to hold and their distance to the nearest sample."""
     n_parameters = surrogate.points.shape[1]
     occupied = checked_points(occupied, n_parameters)
@@ -404,7 +400,7 @@ def _check_aggregate(aggregate: str) -> None:
         raise ValueError(f"aggregate must be one of {', '.join(AGGREGATES)}, got '{aggregate}'")
 
 
-def _diameter(points: Array) -> float:
+def _diameter(points: FloatArray) -> float:
     """Largest distance between two of the points (point, parameter), in blocks of 1024."""
     return max(
         float(cdist(points[start : start + 1024], points[start:]).max())

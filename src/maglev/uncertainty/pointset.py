@@ -14,7 +14,8 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
-from maglev.uncertainty.distributions import FloatArray, Marginals
+from maglev.arrays import FloatArray
+from maglev.uncertainty.distributions import Marginals
 
 COUNTING_POINTS = 2**20
 """Counting points per set: relative counting error below 10 % for a cell of probability 1e-4."""

@@ -11,12 +11,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from maglev.uncertainty.samples import (
-    FloatArray,
-    check_lost_probability,
-    effective_size,
-    weighted_sample,
-)
+from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.uncertainty.samples import check_lost_probability, effective_size, weighted_sample
+from maglev.vocabulary import GIVEN, INFINITE, TOO_FEW
 
 FAILURE_PROBABILITIES = (1e-1, 1e-2, 1e-3)
 """Levels at which limits are given by default."""
@@ -24,9 +21,6 @@ FAILURE_PROBABILITIES = (1e-1, 1e-2, 1e-3)
 CARRIED = 10
 """Expected exceedances, to the nearest whole number, that a sample needs to carry a level; fewer
 and no number is given."""
-
-GIVEN, BEYOND_SAMPLE, LOST = "given", "beyond the sample", "exceeded by the lost samples"
-"""What can be said of a limit: see ``Limits.status``."""
 
 _ROUNDING = 1e-12  # of a sum of probabilities, so that 1000 samples carry exactly one at 1e-3
 
@@ -47,9 +41,7 @@ class Limits:
     expected_exceedances : (level,)
         Number of held samples expected beyond the limit [-].
     status : (level,)
-        ``"given"``; ``"beyond the sample"`` with fewer than ten expected exceedances; or
-        ``"exceeded by the lost samples"``, where losses alone are likelier than the level and no
-        finite limit exists.
+        A word of `maglev.vocabulary.LIMIT_STATUS`: too few are less than ten expected exceedances.
     confidence
         Confidence of the interval [-]; None with no interval.
     """
@@ -614,9 +606,7 @@ def _quantile(values: FloatArray, probability: FloatArray, levels: FloatArray) -
     return values[order][np.minimum(place, values.size - 1)]
 
 
-def _order_statistics(
-    n: int, quantile: FloatArray, confidence: float
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _order_statistics(n: int, quantile: FloatArray, confidence: float) -> tuple[IntArray, IntArray]:
     """Ranks, 0 to n + 1, of the order statistics that hold a quantile with the confidence."""
     outside = 0.5 * (1.0 - confidence)
     first = stats.binom.ppf(outside, n, quantile).astype(np.int64)
@@ -647,9 +637,9 @@ def _fewest_residuals(confidence: float) -> int:
     return int(np.ceil(2.0 / (1.0 - confidence) * (1.0 - _ROUNDING))) - 1
 
 
-def _status(expected: FloatArray, lost: npt.NDArray[np.bool_]) -> tuple[str, ...]:
+def _status(expected: FloatArray, lost: BoolArray) -> tuple[str, ...]:
     return tuple(
-        LOST if none_finite else GIVEN if round(count) >= CARRIED else BEYOND_SAMPLE
+        INFINITE if none_finite else GIVEN if round(count) >= CARRIED else TOO_FEW
         for count, none_finite in zip(expected, lost, strict=True)
     )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from maglev.arrays import FloatArray
 
 SUM_TOLERANCE = 1e-9
 """How far probabilities may sum from one: far above rounding, far below one point's. Assumed."""
