@@ -7,7 +7,6 @@ equal data give equal bytes: no time of writing stands inside.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from maglev.fingerprint import file_hash
 from maglev.vocabulary import (
     DECISIONS,
     DENSITY_METHODS,
@@ -1011,12 +1011,6 @@ def check(dataset: xr.Dataset, layout: str) -> None:
                 f"{layout}: '{name}' must be in '{expected.units}', "
                 f"got '{found.attrs.get('units')}'"
             )
-
-
-def file_hash(path: str | Path) -> str:
-    """SHA-256 of a file's bytes, in hexadecimal."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def provenance(

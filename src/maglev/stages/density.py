@@ -10,12 +10,14 @@ from scipy import stats
 
 from maglev.arrays import FloatArray
 from maglev.parameters import Config
+from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, extremes, lost
+from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import loss_comment, stored_predictor
 from maglev.uncertainty.gdee import density_with_strays, direct_density, silverman_bandwidth
 from maglev.uncertainty.reliability import error_range_near, exceedance
 from maglev.uncertainty.samples import held_part
-from maglev.vocabulary import DENSITY_METHODS, RESPONSES
+from maglev.vocabulary import BASELINE, DENSITY_METHODS, DESIGNED, RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -27,6 +29,34 @@ REACH = 4.0
 normal kernel has fallen to 3e-4 of its peak there."""
 
 COMMENT = "density of the held part: it integrates to one less lost_probability"
+
+
+def dataset(
+    config: Config,
+    baseline: xr.Dataset | None = None,
+    design: xr.Dataset | None = None,
+    surrogate: xr.Dataset | None = None,
+    eev: xr.Dataset | None = None,
+) -> xr.Dataset:
+    """Density and exceedance of a baseline, or of what a surrogate predicts.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    baseline
+        Layout ``runs``; in its place the three others, as `of_surrogate` takes them.
+
+    Returns
+    -------
+    dataset
+        Layout ``density``.
+    """
+    if baseline is not None:
+        return of_baseline(config, baseline)
+    if design is None or surrogate is None or eev is None:
+        raise ValueError("density: needs a baseline, or a design with its surrogate and eev")
+    return of_surrogate(config, design, surrogate, eev)
 
 
 def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
@@ -63,7 +93,7 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
             | {"exceedance_low": low, "exceedance_high": high}
             | {"density_direct_low": band[0], "density_direct_high": band[1]}
         )
-    result = _dataset(columns, float(away.mean()), n)
+    result = _put_together(columns, float(away.mean()), n)
     result["exceedance"].attrs["comment"] = "interval: exact binomial, at each value by itself"
     return result
 
@@ -146,7 +176,7 @@ def of_surrogate(
                 )[::-1],
             }
         )
-    result = _dataset(columns, loss.probability, design.sizes["sample"])
+    result = _put_together(columns, loss.probability, design.sizes["sample"])
     result["lost_probability"].attrs["comment"] = loss_comment(loss)
     result["exceedance"].attrs["comment"] = (
         "exact weighted distribution of the representative points; interval: leave-one-out "
@@ -266,7 +296,7 @@ def _column(values: FloatArray, probability: FloatArray, lost_probability: float
     }
 
 
-def _dataset(columns: list[dict], lost_probability: float, n_runs: int) -> xr.Dataset:
+def _put_together(columns: list[dict], lost_probability: float, n_runs: int) -> xr.Dataset:
     """The file's dataset from what it holds of each response."""
     variables = {}
     for name in columns[0]:
@@ -280,3 +310,18 @@ def _dataset(columns: list[dict], lost_probability: float, n_runs: int) -> xr.Da
     for name in ("density", "density_direct"):
         result[name].attrs["comment"] = COMMENT
     return result
+
+
+STAGE = Stage(
+    name="density",
+    of="method",
+    reads=PREDICTING,
+    inputs={
+        "baseline": Input("runs", methods=(BASELINE,)),
+        "design": Input("design", methods=DESIGNED),
+        "surrogate": Input("surrogate", methods=DESIGNED),
+        "eev": Input("eev", methods=DESIGNED),
+    },
+    layout="density",
+    compute=dataset,
+)

@@ -24,7 +24,11 @@ from maglev import datasets
 from maglev.arrays import FloatArray, IntArray
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
-from maglev.stages.points import case_of, generator, marginals
+from maglev.stage import Input, Stage
+from maglev.stages.extremes import extremes, lost
+from maglev.stages.points import case_of, marginals
+from maglev.stages.randomness import generator
+from maglev.stages.reads import RUNS_OF_CASE
 from maglev.stages.runs import content, key_of, runs
 from maglev.uncertainty.adaptive import AdaptiveState, absorb, decision, propose
 from maglev.uncertainty.failure_region import border_batch, fit_failure_region
@@ -33,7 +37,7 @@ from maglev.uncertainty.learning import predicted_limits, tail_batch, taylor_bat
 from maglev.uncertainty.pointset import sobol_points
 from maglev.uncertainty.selection import fit_selected
 from maglev.uncertainty.surrogate import Fit, Surrogate
-from maglev.vocabulary import ADAPTIVE, DECISIONS, RESPONSES
+from maglev.vocabulary import ADAPTIVE, DECISIONS, DESIGNED, RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -48,10 +52,11 @@ def dataset(
     config: Config,
     case: str,
     method: str,
-    points: Mapping[str, xr.Dataset],
-    store: str | Path,
-    *,
+    initial_points: xr.Dataset,
+    candidate_points: xr.Dataset | None = None,
     baseline: xr.Dataset | None = None,
+    *,
+    store: str | Path,
     n_threads: int = 1,
 ) -> xr.Dataset:
     """Make a design, or go on with one that was stopped.
@@ -64,13 +69,14 @@ def dataset(
         Name of the case.
     method
         ``"osm"``, ``"asm_paper"`` or ``"asm"``.
-    points
-        Layout ``points``: the first design as ``"initial"`` and, for an adaptive method,
-        ``"candidates"``.
-    store
-        Folder of the store of runs and rounds.
+    initial_points
+        Layout ``points``: the first design.
+    candidate_points
+        Layout ``points``: what the rounds of an adaptive method choose from.
     baseline
         Layout ``runs``: what the surrogate of each round is compared with.
+    store
+        Folder of the store of runs and rounds.
     n_threads
         Rows of samples computed at the same time; the numbers do not depend on it.
 
@@ -89,6 +95,9 @@ def dataset(
     ----------
     docs/theory/adaptive_sampling.md.
     """
+    points = {"initial": initial_points}
+    if candidate_points is not None:
+        points["candidates"] = candidate_points
     with threadpool_limits(1, "blas"):  # more threads would sum in another order
         return _Design(config, case, method, points, store, baseline, n_threads).finished()
 
@@ -353,23 +362,18 @@ class _Design:
         return whole
 
 
-def _extremes(dataset: xr.Dataset) -> FloatArray:
-    """Extremes (sample, response) of runs."""
-    return np.stack([dataset[name].values for name in RESPONSES], axis=1)
-
-
 def _absorbed(state: AdaptiveState, one: xr.Dataset) -> AdaptiveState:
     """The state with one round more."""
-    lost = one["status"].values != 0
+    away = lost(one)
     predicted = one["predicted"].values if state.tested.size else None
-    values = np.where(lost[:, None], np.nan, _extremes(one))
-    return absorb(state, one["standard"].values, values, lost, predicted)
+    values = np.where(away[:, None], np.nan, extremes(one))
+    return absorb(state, one["standard"].values, values, away, predicted)
 
 
 def _held(baseline: xr.Dataset) -> tuple[FloatArray, FloatArray]:
     """Points (sample, parameter) and extremes (sample, response) of a baseline that held."""
-    held = baseline["status"].values == 0
-    return baseline["standard"].values[held], _extremes(baseline)[held]
+    held = ~lost(baseline)
+    return baseline["standard"].values[held], extremes(baseline)[held]
 
 
 def _hash(*arrays: FloatArray) -> str:
@@ -385,3 +389,19 @@ def _largest_change(before: FloatArray, after: FloatArray, scale: FloatArray) ->
     both = np.isinf(before) & np.isinf(after)
     change = np.abs(np.where(both, 0.0, after) - np.where(both, 0.0, before))
     return float(np.max(change / scale[:, None]))
+
+
+STAGE = Stage(
+    name="design",
+    of="method",
+    reads=(*RUNS_OF_CASE, "study.failure_probability", "study.{method}"),
+    inputs={
+        "initial_points": Input("points"),
+        "candidate_points": Input("points", methods=ADAPTIVE),
+        "baseline": Input("runs", optional=True),
+    },
+    takes={"case": str, "method": str, "store": Path, "n_threads": int},
+    methods=DESIGNED,
+    layout="design",
+    compute=dataset,
+)

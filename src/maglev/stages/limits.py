@@ -11,8 +11,10 @@ import xarray as xr
 
 from maglev.arrays import FloatArray
 from maglev.parameters import Config
+from maglev.stage import Input, Stage
 from maglev.stages.density import binomial_interval
 from maglev.stages.extremes import coordinates, extremes, lost, population
+from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import loss_comment, stored_predictor
 from maglev.uncertainty.reliability import (
     Limits,
@@ -20,9 +22,36 @@ from maglev.uncertainty.reliability import (
     sample_limits,
     surrogate_limits,
 )
-from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
+from maglev.vocabulary import BASELINE, DESIGNED, GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
 
 _LOG = logging.getLogger(__name__)
+
+
+def dataset(
+    config: Config,
+    baseline: xr.Dataset | None = None,
+    design: xr.Dataset | None = None,
+    surrogate: xr.Dataset | None = None,
+) -> xr.Dataset:
+    """Limits of a baseline, or of what a surrogate predicts.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    baseline
+        Layout ``runs``; in its place the two others, as `of_surrogate` takes them.
+
+    Returns
+    -------
+    dataset
+        Layout ``limits``.
+    """
+    if baseline is not None:
+        return of_baseline(config, baseline)
+    if design is None or surrogate is None:
+        raise ValueError("limits: needs a baseline, or a design with its surrogate")
+    return of_surrogate(config, design, surrogate)
 
 
 def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
@@ -43,7 +72,7 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
     values, away = extremes(runs), lost(runs)
     n_lost = int(np.count_nonzero(away))
     low, high = binomial_interval(n_lost, away.size, config.study.confidence)
-    result = _dataset(
+    result = _put_together(
         config,
         baseline_limits(config, values, away),
         baseline_limits(config, values[~away], away[~away]),
@@ -134,7 +163,7 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
         ]
         for of in (losing, {})
     )
-    result = _dataset(
+    result = _put_together(
         config,
         limits,
         held_limits,
@@ -181,7 +210,7 @@ def status_numbers(limits: Limits) -> list[int]:
     return [LIMIT_STATUS.index(status) for status in limits.status]
 
 
-def _dataset(
+def _put_together(
     config: Config,
     limits: list[Limits],
     held_limits: list[Limits],
@@ -223,3 +252,17 @@ def _dataset(
         },
         coords=coordinates(failure_probability=list(config.study.failure_probability)),
     )
+
+
+STAGE = Stage(
+    name="limits",
+    of="method",
+    reads=(*PREDICTING, "study.failure_probability"),
+    inputs={
+        "baseline": Input("runs", methods=(BASELINE,)),
+        "design": Input("design", methods=DESIGNED),
+        "surrogate": Input("surrogate", methods=DESIGNED),
+    },
+    layout="limits",
+    compute=dataset,
+)

@@ -10,6 +10,7 @@ import xarray as xr
 from maglev.mechanics import train as train_model
 from maglev.mechanics.integrate import closed_train
 from maglev.parameters import Config
+from maglev.stage import Stage
 
 PROPORTIONAL_RANGE, DERIVATIVE_RANGE = (0.4, 1.6), (0.4, 1.6)
 """Gains of the map over their means [-]: four deviations on either side at a coefficient of
@@ -79,3 +80,12 @@ def dataset(config: Config) -> xr.Dataset:
         },
         coords={"grid_proportional": proportional, "grid_derivative": derivative},
     )
+
+
+STAGE = Stage(
+    name="stability",
+    of="run",
+    reads=("train", "gains"),
+    layout="stability",
+    compute=dataset,
+)

@@ -11,11 +11,14 @@ from scipy import stats
 
 from maglev.arrays import FloatArray
 from maglev.parameters import Config
-from maglev.stages.extremes import coordinates, extremes, generator, lost, population
+from maglev.stage import Input, Stage
+from maglev.stages.extremes import coordinates, extremes, lost, population
+from maglev.stages.randomness import generator_of_statistics
+from maglev.stages.reads import PREDICTING, SURROGATE_OF_METHODS
 from maglev.uncertainty.failure_region import Loss, learnt_loss
 from maglev.uncertainty.selection import Selected, fit_selected, rebuilt
 from maglev.uncertainty.surrogate import relative_error
-from maglev.vocabulary import SURROGATES
+from maglev.vocabulary import DESIGNED, SURROGATES
 
 _LOG = logging.getLogger(__name__)
 
@@ -190,7 +193,7 @@ def sobol_indices(
     def bounded(points: FloatArray) -> FloatArray:
         return np.clip(surrogate.predict(points.T), lowest, highest).T
 
-    rng = generator(seed, "Sobol' indices")
+    rng = generator_of_statistics(seed, "Sobol' indices")
     shape = (N_SOBOL_SETS, len(surrogate.kinds), n_parameters)
     first, total = np.empty(shape), np.empty(shape)
     for number in range(N_SOBOL_SETS):
@@ -211,5 +214,17 @@ def sobol_indices(
 
 def _loss(config: Config, points: FloatArray, away: np.ndarray) -> Loss:
     everywhere = population(config.seed, config.study.n_population, points.shape[1])
-    rng = generator(config.seed, "border of the lost region")
+    rng = generator_of_statistics(config.seed, "border of the lost region")
     return learnt_loss(points, away, everywhere, rng, config.study.confidence)
+
+
+STAGE = Stage(
+    name="surrogate",
+    of="method",
+    reads=(*PREDICTING, *SURROGATE_OF_METHODS),
+    inputs={"design": Input("design")},
+    takes={"method": str},
+    methods=DESIGNED,
+    layout="surrogate",
+    compute=dataset,
+)
