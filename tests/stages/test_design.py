@@ -9,20 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from formula_train import FormulaTrain, config, drawn, made
+from formula_train import config, drawn, made
 from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev import datasets
-from maglev.stages import design, runs
+from maglev.stages import design
 from maglev.vocabulary import DECISIONS, RESPONSES
-
-
-@pytest.fixture
-def train(monkeypatch):
-    one = FormulaTrain()
-    monkeypatch.setattr(runs, "simulate", one)
-    monkeypatch.setattr(runs, "BATCH", 8)
-    return one
 
 
 def values(dataset):

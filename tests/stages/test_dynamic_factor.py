@@ -40,8 +40,7 @@ class Simulated:
 
 
 @pytest.fixture
-def config(pytestconfig, monkeypatch):
-    monkeypatch.chdir(pytestconfig.rootpath / "config")
+def config(in_config_folder):
     return CONFIG
 
 

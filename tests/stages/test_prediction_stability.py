@@ -7,8 +7,7 @@ from numpy.testing import assert_allclose
 
 from maglev.datasets import check, describe
 from maglev.parameters import Config
-from maglev.stages import density, prediction, stability, surrogate
-from maglev.uncertainty.gdee import direct_density
+from maglev.stages import prediction, stability, surrogate
 
 CONFIG = synthetic.CONFIG
 
@@ -45,24 +44,3 @@ def test_the_map_grows_below_the_static_limit_and_dies_out_above(monkeypatch):
     k_p, growth = found["grid_proportional"].to_numpy(), found["growth_rate"].to_numpy()
     assert (growth[:, k_p < 0.95 * float(found["static_limit"])] > 1.0).all()
     assert (growth[:, k_p > 1.2 * float(found["static_limit"])] < 0.0).all()
-
-
-def test_the_band_of_a_density_is_that_of_repeated_samples():
-    rng, n, lost = np.random.default_rng(2), 400, 0.1
-    at, h = np.linspace(-2.5, 2.5, 9), 0.3
-    made = []
-    for _ in range(600):
-        values = rng.standard_normal(rng.binomial(n, 1 - lost))
-        share = 1 - values.size / n
-        made.append(direct_density(at, values, bandwidth=h, lost_probability=share))
-    sample = rng.standard_normal(40_000)  # what the band is estimated from, here without its noise
-    column = {
-        "value": at,
-        "density_direct": np.mean(made, axis=0),
-        "bandwidth": h,
-    }
-    low, high = density.density_band(column, sample, lost, n, 0.95)
-    deviation = (high - column["density_direct"]) / 1.959964
-    assert (low >= 0).all()
-    assert_allclose(deviation, np.std(made, axis=0), rtol=0.12)
-    assert np.mean(deviation / np.std(made, axis=0)) == pytest.approx(1.0, abs=0.05)

@@ -5,21 +5,13 @@ import signal
 import numpy as np
 import pytest
 import xarray as xr
-from formula_train import FormulaTrain, config, in_a_process, made, written
+from formula_train import config, in_a_process, made, written
 from numpy.testing import assert_array_equal
 
 from maglev import datasets, simulate, vocabulary
 from maglev.config import from_mapping
-from maglev.stages import baseline, baseline_chunk, baseline_points, points, runs, track_runs
+from maglev.stages import baseline, baseline_chunk, baseline_points, points, track_runs
 from maglev.stages.runs import stored_runs
-
-
-@pytest.fixture
-def train(monkeypatch):
-    one = FormulaTrain()
-    monkeypatch.setattr(runs, "simulate", one)
-    monkeypatch.setattr(runs, "BATCH", 8)
-    return one
 
 
 def test_a_stored_run_is_the_run_itself(tmp_path):

@@ -17,9 +17,7 @@ SMALL = from_mapping(
 )
 
 
-@pytest.fixture(autouse=True)
-def _beside_the_measurements(pytestconfig, monkeypatch):
-    monkeypatch.chdir(pytestconfig.rootpath / "config")
+pytestmark = pytest.mark.usefixtures("in_config_folder")
 
 
 def test_the_spectrum_of_the_sample_lies_on_the_target():

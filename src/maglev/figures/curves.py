@@ -20,7 +20,7 @@ _GIVEN = LIMIT_STATUS.index(GIVEN)
 
 def named(data: Sequence[xr.Dataset]) -> xr.DataArray:
     """The coordinate ``curve`` of files: their cases and methods."""
-    names = [f"{labels.case_of(one)}-{labels.method_of(one)}" for one in data]
+    names = [f"{labels.case_name(one)}-{labels.method_of(one)}" for one in data]
     flags = {"flag_values": np.arange(len(names), dtype="int32"), "flag_meanings": " ".join(names)}
     return xr.DataArray(np.arange(len(names), dtype="int32"), dims="curve", attrs=flags)
 

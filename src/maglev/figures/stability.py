@@ -91,7 +91,7 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
         f"border of the linearised train, {border:.0f} A/m at the mean $k_d$",
         "mean gains",
     ]
-    style.below(fig, handles, words, ncols=3)
+    style.below(fig, handles, words, columns=3)
     gains = runs[["suspension_proportional_gain", "suspension_derivative_gain", "status"]]
     return fig, xr.merge([stability, gains])
 

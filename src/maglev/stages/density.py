@@ -6,7 +6,6 @@ import logging
 
 import numpy as np
 import xarray as xr
-from scipy import stats
 
 from maglev.arrays import FloatArray
 from maglev.parameters import Config
@@ -14,8 +13,13 @@ from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, extremes, lost
 from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import loss_comment, stored_predictor
-from maglev.uncertainty.gdee import density_with_strays, direct_density, silverman_bandwidth
-from maglev.uncertainty.reliability import error_range_near, exceedance
+from maglev.uncertainty.gdee import (
+    density_with_strays,
+    direct_density,
+    direct_density_band,
+    silverman_bandwidth,
+)
+from maglev.uncertainty.reliability import binomial_interval, error_range_near, exceedance
 from maglev.uncertainty.samples import held_part
 from maglev.vocabulary import BASELINE, DENSITY_METHODS, DESIGNED, RESPONSES
 
@@ -87,7 +91,15 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
         column = _column(held.values, held.probability, held.lost_probability)
         n_beyond = np.round(column["exceedance"] * n)
         low, high = binomial_interval(n_beyond, n, config.study.confidence)
-        band = density_band(column, held.values, held.lost_probability, n, config.study.confidence)
+        band = direct_density_band(
+            column["value"],
+            held.values,
+            n,
+            density=column["density_direct"],
+            bandwidth=column["bandwidth"],
+            lost_probability=held.lost_probability,
+            confidence=config.study.confidence,
+        )
         columns.append(
             column
             | {"exceedance_low": low, "exceedance_high": high}
@@ -183,76 +195,6 @@ def of_surrogate(
         "residuals of the training samples near each value"
     )
     return result
-
-
-def binomial_interval(
-    n_beyond: FloatArray | float, n: int, confidence: float
-) -> tuple[FloatArray, FloatArray]:
-    """Exact interval of a probability of which ``n_beyond`` of ``n`` samples speak.
-
-    Parameters
-    ----------
-    n_beyond : (...)
-        Numbers of samples.
-    n
-        Number of all.
-    confidence
-        Two-sided confidence [-].
-
-    Returns
-    -------
-    low, high : (...)
-        Ends of the interval [-].
-
-    References
-    ----------
-    Clopper, Pearson, Biometrika 26 (1934) 404-413.
-    """
-    k = np.asarray(n_beyond, dtype=float)
-    outside = 0.5 * (1.0 - confidence)
-    low = np.where(k > 0, stats.beta.ppf(outside, np.maximum(k, 1), n - k + 1), 0.0)
-    high = np.where(k < n, stats.beta.ppf(1.0 - outside, k + 1, np.maximum(n - k, 1)), 1.0)
-    return low, high
-
-
-def density_band(
-    column: dict, values: FloatArray, lost_probability: float, n: int, confidence: float
-) -> tuple[FloatArray, FloatArray]:
-    """Band of the sampling noise of a direct density of independent runs, place by place.
-
-    The density is a mean over all runs of the kernel φ_h, its variance that of the kernel over n;
-    the mean of φ_h² is the direct density with the bandwidth h/√2, over 2√π h.  The kernel's bias
-    is not in it.
-
-    Parameters
-    ----------
-    column
-        ``value``, ``density_direct`` and ``bandwidth`` h of the density.
-    values : (sample,)
-        Extremes that held [their unit].
-    lost_probability
-        Share of runs that did not [-].
-    n
-        Number of all runs.
-    confidence
-        Two-sided confidence [-].
-
-    Returns
-    -------
-    low, high : (place,)
-        Ends of the band [1/unit]; the lower one is at least 0.
-
-    References
-    ----------
-    Silverman, Density Estimation (1986), sec. 3.3.
-    """
-    h, density = column["bandwidth"], column["density_direct"]
-    narrower = direct_density(
-        column["value"], values, bandwidth=h / np.sqrt(2.0), lost_probability=lost_probability
-    )
-    variance = np.maximum(narrower / (2.0 * np.sqrt(np.pi) * h) - density**2, 0.0) / n
-    half = stats.norm.ppf(0.5 + 0.5 * confidence) * np.sqrt(variance)
-    return np.maximum(density - half, 0.0), density + half
 
 
 def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> FloatArray:

@@ -12,12 +12,12 @@ import xarray as xr
 from maglev.arrays import FloatArray
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.density import binomial_interval
 from maglev.stages.extremes import coordinates, extremes, lost, population
 from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import loss_comment, stored_predictor
 from maglev.uncertainty.reliability import (
     Limits,
+    binomial_interval,
     error_range_near,
     sample_limits,
     surrogate_limits,

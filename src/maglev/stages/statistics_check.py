@@ -12,9 +12,9 @@ import xarray as xr
 from maglev.arrays import FloatArray
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.density import binomial_interval
 from maglev.stages.extremes import extremes, lost
 from maglev.stages.limits import baseline_limits, status_numbers
+from maglev.uncertainty.reliability import binomial_interval
 from maglev.vocabulary import LIMIT_STATUS, METHODS, RESPONSES
 
 _LOG = logging.getLogger(__name__)

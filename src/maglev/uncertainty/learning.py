@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from maglev.arrays import FloatArray, IntArray
+from maglev.uncertainty.samples import weighted_quantile
 from maglev.uncertainty.surrogate import Surrogate, SurrogateWithDeviation, checked_points
 
 AGGREGATES = ("sum", "maximum")
@@ -218,7 +219,7 @@ def predicted_limits(
             f"held_probability must be {n} numbers between 0 and 1, one per point, got shape "
             f"{held.shape}"
         )
-    return _weighted_limits(values, levels - np.mean(1.0 - held), held / n)
+    return _quantiles(values, held / n, levels - np.mean(1.0 - held))
 
 
 def tail_batch(
@@ -290,7 +291,7 @@ def tail_batch(
     scale = np.std(surrogate.values, axis=0)
     limits = predicted_limits(values, exceedances, held)
     # where losses alone exceed the probability, the limit of the samples that hold is the target
-    standing = _weighted_limits(values, np.asarray(exceedances, float), held / held.sum())
+    standing = _quantiles(values, held / held.sum(), np.asarray(exceedances, float))
     limits = np.where(np.isfinite(limits), limits, standing)
 
     targets = [
@@ -344,19 +345,11 @@ CRITERIA = {"taylor": taylor_batch, "tail": tail_batch}
 """Criteria by the name they have in a configuration."""
 
 
-def _weighted_limits(values: FloatArray, levels: FloatArray, weight: FloatArray) -> FloatArray:
-    """Smallest value (level, response) beyond which no more than ``levels`` of ``weight`` lies."""
-    limits = np.empty((levels.size, values.shape[1]))
-    for response in range(values.shape[1]):
-        order = np.argsort(values[:, response], kind="stable")
-        ordered = values[order, response]
-        beyond = np.append(np.cumsum(weight[order][:0:-1])[::-1], 0.0)
-        # the tolerance forgives the rounding of the sums, far below one point's share
-        reached = beyond[None, :] <= levels[:, None] + 1e-6 / ordered.size
-        reached &= levels[:, None] >= 0.0
-        first = np.argmax(reached, axis=1)
-        limits[:, response] = np.where(reached.any(axis=1), ordered[first], np.inf)
-    return limits
+def _quantiles(values: FloatArray, weight: FloatArray, beyond: FloatArray) -> FloatArray:
+    """Weighted quantile (level, response) of each response; infinite where none may lie beyond."""
+    rounding = 1e-6 / values.shape[0]  # of the sums, far below one point's share
+    found = [weighted_quantile(one, weight, beyond, rounding) for one in values.T]
+    return np.where(beyond[:, None] >= 0.0, np.column_stack(found), np.inf)
 
 
 def _nodes(excess: FloatArray, deviation: FloatArray, spread: float, held: FloatArray) -> IntArray:

@@ -144,36 +144,6 @@ def sobol_points(marginals: Marginals, n: int, rng: np.random.Generator) -> Poin
     return _equal_weights(_sobol_unit(marginals.n, n, rng), marginals)
 
 
-def latin_hypercube_points(marginals: Marginals, n: int, rng: np.random.Generator) -> PointSet:
-    """One-stage set of Latin hypercube points of equal weight, random within their strata.
-
-    Parameters
-    ----------
-    marginals
-        The random inputs.
-    n
-        Number of points, two or more.
-    rng
-        Source of the permutations and of the places within the strata.
-
-    Returns
-    -------
-    point_set
-        The points with probability 1/n each.
-
-    Raises
-    ------
-    ValueError
-        If ``n`` is less than two.
-
-    References
-    ----------
-    McKay, Beckman, Conover, Technometrics 21 (1979) 239-245; scipy.stats.qmc.LatinHypercube.
-    """
-    _check_size(n)
-    return _equal_weights(qmc.LatinHypercube(marginals.n, rng=rng).random(n), marginals)
-
-
 def rearranged(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Marginals) -> FloatArray:
     """Points moved, input by input and order kept, to where their weights put them.
 
