@@ -56,7 +56,7 @@ rule all:
     default_target: True
     input:
         rules.run_config.output,
-        results_of_all_cases(),
+        results(),
         figures_of_study(),
 
 

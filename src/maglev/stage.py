@@ -78,7 +78,7 @@ class Stage:
         What it is given besides, with its type: ``case``, ``method``, ``store`` (folder in which
         runs are kept), ``n_threads``, or any other name, which is a wildcard of its rule.
     methods
-        Methods for which its file is made.
+        Methods for which its file is made; of a stage of a case, of which the case needs one.
     table
         From the described dataset to rows and text of a table that is written beside the file as
         CSV and Markdown.

@@ -192,6 +192,7 @@ def test_a_profile_edited_within_a_session_is_seen(tmp_path, monkeypatch):
     (tmp_path / "measurements").mkdir()
     source = Path(__file__).parents[2] / "config" / "measurements" / "shanghai.yaml"
     shutil.copy(source, tmp_path / "measurements")
+    written(0.0)
     config, stage = from_mapping(mapping), named("passage")
     extremes = []
     for scale in (1e-4, 2e-4, 1e-4):

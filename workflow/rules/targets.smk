@@ -41,22 +41,31 @@ def of_last_method(cases: list[str], *stages: str) -> list[str]:
     ]
 
 
-def results_of_all_cases() -> list[str]:
-    """Every file of the study for all cases and methods that are named."""
+def possible(stage, case: str) -> bool:
+    """Whether a case has what a stage of it needs: methods, and a random track for its parts."""
+    of_track = "track_runs" in (stage.name, *stage.inputs)
+    needed = [STAGES[role] for role, one in stage.inputs.items() if not one.optional]
+    return (case in TRACK_CASES or not of_track) and all(
+        methods_of(case, one.methods) for one in (stage, *needed)
+    )
+
+
+def results() -> list[str]:
+    """The file of every stage for all cases and methods that are named."""
     files = (
         [place("statistics_check", scope="statistics")] if checked_cases(False) else []
     )
-    for case in parameters.cases:
-        if methods_of(case, (BASELINE,)):
-            files.append(place("baseline", case=case))
-        for stage in ("design", "density", "limits"):
-            files += of_methods(stage, case)
-        if case in checked_cases(False) and judged(case):
-            files.append(place("accuracy", case=case))
-        if case in TRACK_CASES:
-            files.append(place("track_split", case=case))
-    if judged(TABLE_CASE):
-        files += [place("table1"), place("paper_and_ours")]
+    for name, stage in STAGES.items():
+        wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
+        if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
+            files.append(place(name))
+        if wildcards == {"case"}:
+            cases = [case for case in parameters.cases if possible(stage, case)]
+            files += [place(name, case=case) for case in cases]
+        if wildcards == {"case", "method"}:
+            files += [
+                file for case in parameters.cases for file in of_methods(name, case)
+            ]
     return files
 
 

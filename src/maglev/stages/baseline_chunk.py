@@ -12,6 +12,7 @@ from maglev.stage import Stage
 from maglev.stages.points import baseline, case_of, track_seeds
 from maglev.stages.reads import RUNS_OF_CASE
 from maglev.stages.runs import runs
+from maglev.vocabulary import BASELINE
 
 
 def dataset(
@@ -67,6 +68,7 @@ STAGE = Stage(
     of="case",
     reads=RUNS_OF_CASE,
     takes={"case": str, "start": int, "stop": int, "store": Path, "n_threads": int},
+    methods=(BASELINE,),
     layout="runs",
     compute=dataset,
 )

@@ -11,6 +11,7 @@ from maglev.stages import points
 from maglev.stages.points import baseline, marginals, n_samples
 from maglev.stages.reads import N_SAMPLES, RANDOM_GAINS
 from maglev.uncertainty.pointset import PointSet, gf_discrepancy
+from maglev.vocabulary import BASELINE
 
 
 def dataset(config: Config, case: str) -> xr.Dataset:
@@ -53,6 +54,7 @@ STAGE = Stage(
     of="case",
     reads=(*RANDOM_GAINS, *N_SAMPLES),
     takes={"case": str},
+    methods=(BASELINE,),
     layout="points",
     compute=dataset,
 )

@@ -9,6 +9,7 @@ from maglev.stage import Stage
 from maglev.stages import points
 from maglev.stages.points import gf_set
 from maglev.stages.reads import RANDOM_GAINS
+from maglev.vocabulary import DESIGNED
 
 
 def dataset(config: Config, case: str) -> xr.Dataset:
@@ -40,6 +41,7 @@ STAGE = Stage(
     of="case",
     reads=(*RANDOM_GAINS, "study.n_representative", "study.n_counting"),
     takes={"case": str},
+    methods=DESIGNED,
     layout="points",
     compute=dataset,
 )

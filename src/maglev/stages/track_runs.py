@@ -12,7 +12,7 @@ from maglev.stage import Stage
 from maglev.stages.points import baseline, case_of, n_samples, track_seeds
 from maglev.stages.reads import N_SAMPLES, RUNS_OF_CASE
 from maglev.stages.runs import runs
-from maglev.vocabulary import TRACK_PARTS
+from maglev.vocabulary import BASELINE, TRACK_PARTS
 
 
 def dataset(
@@ -65,6 +65,7 @@ STAGE = Stage(
     of="case",
     reads=(*RUNS_OF_CASE, *N_SAMPLES),
     takes={"case": str, "part": str, "store": Path, "n_threads": int},
+    methods=(BASELINE,),
     layout="runs",
     compute=dataset,
 )
