@@ -60,3 +60,4 @@ docs: $(VENV)/core.stamp
 	maglev describe schema > workflow/schemas/config.schema.yaml
 	maglev describe parameters > docs/parameters.md
 	maglev describe datasets > docs/datasets.md
+	maglev describe stages > docs/stages.md

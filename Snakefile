@@ -1,10 +1,10 @@
 # From the configuration to the figures: `snakemake --cores 2 all`, or one figure by its name.
+import re
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 from snakemake.utils import min_version, validate
 
-from maglev.datasets import METHODS, TRACK_PARTS
 from maglev.config import (
     ConfigError,
     config_text,
@@ -14,7 +14,9 @@ from maglev.config import (
     rebase,
 )
 from maglev.fingerprint import code_of
-from maglev.stages import SECTIONS, config_slice
+from maglev.stage import flag, stages, summaries
+from maglev.stages.points import n_samples
+from maglev.vocabulary import BASELINE, DESIGNED, METHODS, TRACK_PARTS
 
 min_version("9.0")
 
@@ -26,6 +28,7 @@ try:
     parameters = from_mapping(overlay(read_overlays(base), given))
 except ConfigError as error:
     raise WorkflowError(str(error)) from None
+STAGES, SUMMARIES = stages(), summaries()
 config.clear()
 config.update(parameters.quantities())
 validate(config, "workflow/schemas/config.schema.yaml", set_default=False)
@@ -44,34 +47,24 @@ wildcard_constraints:
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/config.smk"
-include: "workflow/rules/track.smk"
-include: "workflow/rules/validation.smk"
-include: "workflow/rules/points.smk"
-include: "workflow/rules/runs.smk"
-include: "workflow/rules/cases.smk"
-include: "workflow/rules/statistics.smk"
+include: "workflow/rules/stages.smk"
+include: "workflow/rules/targets.smk"
 include: "workflow/rules/figures.smk"
-include: "workflow/rules/study_figures.smk"
 
 
 rule all:
     default_target: True
     input:
         rules.run_config.output,
-        rules.fig7.output,
-        rules.fig8.output,
-        rules.histories.output,
-        rules.gaps.output,
-        rules.modes.output,
-        rules.fig_train_modes.output,
-        runs_of_all_cases(),
-        statistics_of_all_cases(),
+        results(),
         figures_of_study(),
 
 
 rule truth:
     input:
-        [f"<results>/{case}/mcm.nc" for case in parameters.cases],
-        [f"<results>/{case}/mcm/density.nc" for case in parameters.cases],
-        [f"<results>/{case}/mcm/limits.nc" for case in parameters.cases],
-        rules.statistics_truth.output,
+        [
+            place(stage, case=case, method=BASELINE)
+            for stage in ("baseline", "density", "limits")
+            for case in parameters.cases
+        ],
+        place("statistics_check", scope="statistics_truth"),

@@ -22,11 +22,11 @@ import xarray as xr
 
 from maglev import datasets
 from maglev.config import load_config
-from maglev.datasets import RESPONSES
 from maglev.figures import style
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
-from maglev.stages import accuracy, design, points
+from maglev.stages import accuracy, candidate_points, design, initial_points
+from maglev.vocabulary import RESPONSES
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "benchmarks" / "results"
@@ -53,9 +53,10 @@ def of_seed(config: Config, seed: int, baseline: xr.Dataset, store: Path) -> xr.
         return xr.load_dataset(kept)
     drawn = config.model_copy(update={"seed": config.seed + seed})
     sets = {
-        role: points.dataset(drawn, CASE, f"{role}_{METHOD}") for role in ("initial", "candidates")
+        "initial_points": initial_points.dataset(drawn, CASE, METHOD),
+        "candidate_points": candidate_points.dataset(drawn, CASE, METHOD),
     }
-    made = design.dataset(config, CASE, METHOD, sets, store)
+    made = design.dataset(config, CASE, METHOD, **sets, store=store)
     with mock.patch.object(accuracy, "N_STEPS", N_STEPS):
         judged = accuracy.dataset(config, baseline, {METHOD: made})
     KEPT.mkdir(parents=True, exist_ok=True)

@@ -47,7 +47,7 @@ from maglev.mechanics.course import first_step, n_steps, nose, start, time_step
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
 from maglev.simulation import _system, track
-from maglev.stages import config_slice
+from maglev.stages.passage import STAGE
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs" / "benchmarks"
@@ -632,7 +632,7 @@ def writing(config: Config, n_samples: int) -> Time:
     one = simulate(config, gains_of(config, 1))
     many = one.isel(sample=np.zeros(n_samples, dtype=int))
     many = many.assign_coords(sample=np.arange(n_samples))
-    content, code = config_slice(config.quantities(), "passage"), code_of("simulation")
+    content, code = STAGE.slice(config), code_of("simulation")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "passages.nc")
         return timed(lambda: datasets.write(many, path, "passage", config=content, code=code))

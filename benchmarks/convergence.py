@@ -16,11 +16,11 @@ from unittest import mock
 
 import numpy as np
 
-from maglev.datasets import RESPONSES
 from maglev.mechanics import activity, integrate, reduction
 from maglev.mechanics.course import time_step
 from maglev.parameters import Config
 from maglev.simulation import track
+from maglev.vocabulary import RESPONSES
 
 PAGE = Path(__file__).parents[1] / "docs" / "convergence.md"
 SPEEDS_KMH = (430, 200)

@@ -240,6 +240,7 @@ def test_the_shipped_configuration_states_every_default():
         ("workflow/schemas/config.schema.yaml", catalogue.schema),
         ("docs/parameters.md", catalogue.parameter_tables),
         ("docs/datasets.md", catalogue.dataset_tables),
+        ("docs/stages.md", catalogue.stage_tables),
     ],
 )
 def test_files_written_from_the_classes_are_current(name, made):

@@ -1,14 +1,13 @@
 """Files: they explain themselves, appear whole, and equal data give equal bytes."""
 
 import json
-from typing import get_args
 
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
 
-from maglev import datasets, parameters
+from maglev import datasets
 from maglev.datasets import LAYOUTS, VARIABLES, describe, read, write
 
 CONFIG = {"seed": 3, "demonstration": False, "passage": {"speed": "100.0 m/s"}}
@@ -139,10 +138,3 @@ def test_files_follow_the_cf_conventions(tmp_path, layout):
     assert not errors
     messages = [m for r in results if r.value[0] < r.value[1] for m in r.msgs]
     assert not messages
-
-
-def test_the_names_of_responses_and_gains_are_those_of_the_configuration():
-    assert get_args(parameters.Response) == datasets.RESPONSES
-    assert tuple(f"{name}_gain" for name in get_args(parameters.Gain)) == datasets.GAINS
-    assert get_args(parameters.Method) == datasets.METHODS
-    assert (*datasets.SURROGATES, "best") == get_args(parameters.SurrogateKind)

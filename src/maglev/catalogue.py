@@ -18,6 +18,8 @@ from pydantic.fields import FieldInfo
 
 from maglev.datasets import CONVENTIONS, LAYOUTS, VARIABLES, Variable
 from maglev.parameters import CONFIDENCE, SOURCES, Config, Parameters
+from maglev.stage import flag, stages, summaries
+from maglev.vocabulary import METHODS
 
 LINE = 100
 
@@ -309,4 +311,37 @@ def dataset_tables() -> str:
     coordinates = [name for name in VARIABLES if VARIABLES[name].dims == (name,)]
     lines += ["## Coordinates", "", *header]
     lines += [_variable_row(name, VARIABLES[name]) for name in coordinates if name in used]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def stage_tables() -> str:
+    """The document of all stages: what each reads, is given and makes, and its command."""
+    lines = [
+        "# Stages",
+        "",
+        f"<!-- {_BY_COMMAND.format(what='stages')} -->",
+        "",
+        "Each stage is a command, a rule of the workflow of the same name, and one kind of file. "
+        "It computes with a view of the configuration that refuses every key not named here; a "
+        "change of any other key leaves its file as it is. `demonstration` is read by all.",
+        "",
+    ]
+    summary = summaries()
+    for name, stage in stages().items():
+        lines += [f"## `{name}`", "", summary[name], ""]
+        once = {"run": "run", "case": "case", "method": "case and method"}[stage.of]
+        of = f" ({', '.join(stage.methods)})" if stage.methods != METHODS else ""
+        lines += [f"One file a {once}{of}, layout [`{stage.layout}`](datasets.md).", ""]
+        reads = ", ".join(f"`{key}`" for key in stage.reads) or "nothing"
+        lines += [f"Reads {reads}.", ""]
+        if stage.inputs:
+            lines += ["| input | layout | one for each | methods |", "| --- | --- | --- | --- |"]
+            for role, one in stage.inputs.items():
+                methods = ", ".join(one.methods) if one.methods != METHODS else ""
+                may = " (if there is one)" if one.optional else ""
+                by = " and ".join(one.by)
+                lines.append(f"| `{role}`{may} | `{one.layout}` | {by} | {methods} |")
+            lines.append("")
+        options = " ".join(f"{flag(option)} …" for option in stage.options)
+        lines += ["```", *textwrap.wrap(f"maglev {stage.command} {options}", LINE), "```", ""]
     return "\n".join(lines).rstrip() + "\n"

@@ -94,7 +94,7 @@ def _file_keys(model: type[Parameters], path: tuple[str, ...] = ()) -> Iterator[
             yield (*path, name)
 
 
-def _named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
+def named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield the path of every key of the mapping that names a file, and the name."""
     for path in _file_keys(Config):
         value: Any = mapping
@@ -107,7 +107,7 @@ def _named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], 
 def rebase(mapping: Mapping[str, Any], *, old: str | Path, new: str | Path) -> dict[str, Any]:
     """Rewrite file names that are relative to the directory ``old`` as relative to ``new``."""
     rebased = dict(mapping)
-    for path, name in _named_files(mapping):
+    for path, name in named_files(mapping):
         nested: Any = name if os.path.isabs(name) else os.path.relpath(os.path.join(old, name), new)
         for part in reversed(path):
             nested = {part: nested}
@@ -152,7 +152,7 @@ def from_mapping(mapping: Mapping[str, Any]) -> Config:
         other, or a file that is named does not exist.
     """
     config: Config = validated(Config, overlay(Config().quantities(), mapping))
-    for path, name in _named_files(mapping):
+    for path, name in named_files(mapping):
         if not Path(name).is_file():
             raise ConfigError(f"{'.'.join(path)} names a file that does not exist: {name}")
     return config

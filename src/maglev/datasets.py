@@ -7,7 +7,6 @@ equal data give equal bytes: no time of writing stands inside.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -19,6 +18,23 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from maglev.fingerprint import file_hash
+from maglev.vocabulary import (
+    DECISIONS,
+    DENSITY_METHODS,
+    GAIN_UNITS,
+    GAINS,
+    LIMIT_STATUS,
+    METHODS,
+    RESPONSE_UNITS,
+    RESPONSE_WORDS,
+    RESPONSES,
+    SOURCES,
+    STATUS,
+    SURROGATES,
+    TRAIN_PARTS,
+)
+
 CONVENTIONS = "CF-1.11"
 REFERENCES = (
     "Dynamic reliability of a high-speed EMS maglev train on a guideway bridge by an adaptive "
@@ -26,66 +42,6 @@ REFERENCES = (
     "(2024), doi 10.1177/14613484241279033"
 )
 AXES = "x along travel from the first pier, y to the right, z down; SI units"
-
-RESPONSES = (
-    "girder_displacement_z",
-    "girder_displacement_y",
-    "girder_acceleration_z",
-    "girder_acceleration_y",
-    "car_body_acceleration_z",
-    "car_body_acceleration_y",
-)
-"""The six responses whose extremes a passage is judged by."""
-
-GAINS = (
-    "suspension_proportional_gain",
-    "suspension_derivative_gain",
-    "guidance_proportional_gain",
-    "guidance_derivative_gain",
-)
-"""The four gains, in the order of the columns of the array that `simulate` takes."""
-
-
-METHODS = ("mcm", "osm", "asm_paper", "asm")
-"""The methods by which the runs of a case are chosen."""
-
-SURROGATES = ("rbf", "scaled_rbf", "kriging")
-"""The kinds of surrogate."""
-
-TRAIN_PARTS = (
-    "car_body_lateral",
-    "car_body_vertical",
-    "car_body_roll",
-    "car_body_pitch",
-    "car_body_yaw",
-    "bogies",
-    "rods",
-    "suspension_magnets",
-    "guidance_magnets",
-)
-"""What moves in a mode of the train."""
-
-DECISIONS = (
-    "go_on",
-    "error_below_threshold",
-    "limits_settled",
-    "largest_number_of_runs",
-)
-"""What is decided after a round of an adaptive design."""
-
-LIMIT_STATUS = ("given", "too_few_exceedances", "infinite")
-"""What can be said of a limit."""
-
-DENSITY_METHODS = ("gdee", "gdee_of_the_logarithm", "direct")
-"""How a density was found: by the GDEE; by the GDEE of the logarithm of the extreme, where strays
-ask for too fine a mesh; directly, where there is no GDEE or it refused both."""
-
-SOURCES = ("paper", "ours")
-"""Whose number stands there."""
-
-TRACK_PARTS = ("gains_only", "track_only", "other_track", "other_gains")
-"""Further runs of a case whose baseline has gains i on track i: gains i on the configured track;
-mean gains on track i; gains i on track n + i; gains n + i on track i (n samples)."""
 
 OF_RESPONSE = "of the response"
 """In place of a unit: that of the response along ``response``, see `RESPONSE_UNITS`."""
@@ -136,243 +92,19 @@ class Variable:
         }
 
 
-STATUS = {0: "completed", 1: "contact", 2: "gap_lost", 3: "not_finite"}
-"""How a passage ended: levitated throughout, or why it stopped."""
-
-_GIRDER = "of the girder at midspan of the middle span"
-_CAR = "of the car body, largest over the cars"
-_QUANTITY = {
-    "girder_displacement_z": ("m", f"vertical displacement {_GIRDER}"),
-    "girder_displacement_y": ("m", f"lateral displacement {_GIRDER}"),
-    "girder_acceleration_z": ("m s-2", f"vertical acceleration {_GIRDER}"),
-    "girder_acceleration_y": ("m s-2", f"lateral acceleration {_GIRDER}"),
-    "car_body_acceleration_z": ("m s-2", f"vertical acceleration {_CAR}"),
-    "car_body_acceleration_y": ("m s-2", f"lateral acceleration {_CAR}"),
-}
-
-
-RESPONSE_UNITS: Mapping[str, str] = {name: _QUANTITY[name][0] for name in RESPONSES}
-"""Unit of each response in the notation of UDUNITS."""
-
-
-def _table() -> dict[str, Variable]:
-    table = {
-        "sample": Variable(
-            dims=("sample",), units="1", long_name="number of the passage", dtype="int64"
-        ),
-        "car": Variable(
-            dims=("car",), units="1", long_name="number of the car, 0 at the nose", dtype="int32"
-        ),
-        "magnet": Variable(
-            dims=("magnet",), units="1", long_name="number of the magnet", dtype="int32"
-        ),
-        "magnet_kind": Variable(
-            dims=("magnet",),
-            units="1",
-            long_name="kind of the magnet",
-            dtype="int8",
-            flags={0: "suspension", 1: "guidance"},
-        ),
-        "magnet_side": Variable(
-            dims=("magnet",),
-            units="1",
-            long_name="side of the magnet, looking along travel",
-            dtype="int8",
-            flags={-1: "left", 1: "right"},
-        ),
-        "magnet_x": Variable(
-            dims=("magnet",),
-            units="m",
-            long_name="centre of the magnet along travel, from the nose of the train",
-        ),
-        "t": Variable(dims=("t",), units="s", long_name="time since the start of the passage"),
-        "x": Variable(
-            dims=("x",), units="m", long_name="distance along travel from the first pier"
-        ),
-        "side": Variable(
-            dims=("side",),
-            units="1",
-            long_name="side of the guideway, looking along travel",
-            dtype="int8",
-            flags={-1: "left", 1: "right"},
-        ),
-        "wavenumber": Variable(
-            dims=("wavenumber",), units="m-1", long_name="wavenumber, one over the wavelength"
-        ),
-        "mode": Variable(
-            dims=("mode",), units="1", long_name="number of the mode from the lowest", dtype="int32"
-        ),
-        "speed": Variable(dims=("speed",), units="m s-1", long_name="speed of the train"),
-        "measured_speed": Variable(
-            dims=("measured_speed",), units="m s-1", long_name="speed of the measured passage"
-        ),
-        "status": Variable(
-            dims=("sample",),
-            units="1",
-            long_name="how the passage ended",
-            dtype="int8",
-            flags=STATUS,
-        ),
-        "lost_t": Variable(
-            dims=("sample",), units="s", long_name="time at which levitation was lost"
-        ),
-        "lost_magnet": Variable(
-            dims=("sample",),
-            units="1",
-            long_name="number of the magnet that lost levitation, -1 for none",
-            dtype="int32",
-        ),
-    }
-    for name, unit in zip(GAINS, ("A m-1", "A s m-1") * 2, strict=True):
-        table[name] = Variable(
-            dims=("sample",), units=unit, long_name=f"{name.replace('_', ' ')} of the magnets"
-        )
-    for name, (unit, meaning) in _QUANTITY.items():
-        table[name] = Variable(
-            dims=("sample",), units=unit, long_name=f"largest absolute {meaning}"
-        )
-        table[f"{name}_t"] = Variable(
-            dims=("sample",), units="s", long_name=f"time of the largest absolute {meaning}"
-        )
-        of_car = name.startswith("car_body")
-        table[f"{name}_history"] = Variable(
-            dims=("sample", "car", "t") if of_car else ("sample", "t"),
-            units=unit,
-            long_name=meaning.replace(", largest over the cars", ""),
-            dtype="float32",
-        )
-        if of_car:
-            table[f"{name}_per_car"] = Variable(
-                dims=("sample", "car"),
-                units=unit,
-                long_name=f"largest absolute {meaning.replace(', largest over the cars', '')}",
-            )
-    for kind in ("suspension", "guidance"):
-        for end, word in (("min", "smallest"), ("max", "largest")):
-            table[f"{kind}_gap_{end}"] = Variable(
-                dims=("sample",), units="m", long_name=f"{word} gap of any {kind} pole"
-            )
-        table[f"{kind}_current_max"] = Variable(
-            dims=("sample",), units="A", long_name=f"largest current of any {kind} magnet"
-        )
-    table["gap_history"] = Variable(
-        dims=("sample", "magnet", "t"),
-        units="m",
-        long_name="mean gap of the magnet's poles",
-        dtype="float32",
-    )
-    table["current_history"] = Variable(
-        dims=("sample", "magnet", "t"),
-        units="A",
-        long_name="mean current of the magnet's poles",
-        dtype="float32",
-    )
-    for direction in ("vertical", "lateral"):
-        table[f"irregularity_{direction}"] = Variable(
-            dims=("side", "x"), units="m", long_name=f"{direction} irregularity of the rail"
-        )
-        table[f"spectrum_{direction}"] = Variable(
-            dims=("wavenumber",),
-            units="m3",
-            long_name=f"one-sided spectrum of the {direction} irregularity, estimated by Welch",
-        )
-        table[f"target_{direction}"] = Variable(
-            dims=("wavenumber",),
-            units="m3",
-            long_name=f"one-sided spectrum that the {direction} irregularity is drawn from",
-        )
-        table[f"deviation_{direction}"] = Variable(
-            dims=(), units="m", long_name=f"standard deviation of the {direction} irregularity"
-        )
-    table["frequency"] = Variable(
-        dims=("mode",), units="Hz", long_name="natural frequency of the guideway"
-    )
-    table["direction"] = Variable(
-        dims=("mode",),
-        units="1",
-        long_name="motion that holds most of the mode's kinetic energy",
-        dtype="int8",
-        flags={0: "longitudinal", 1: "lateral", 2: "vertical", 3: "torsion"},
-    )
-    for part, where in (("girder", "the girder axis"), ("rail", "the right rail")):
-        for axis, word in (("y", "lateral"), ("z", "vertical")):
-            table[f"{part}_shape_{axis}"] = Variable(
-                dims=("mode", "x"),
-                units="1",
-                long_name=f"{word} motion of {where} in the mode, largest of all four shapes 1",
-            )
-    table["frequency_simply_supported"] = Variable(
-        dims=(),
-        units="Hz",
-        long_name="first vertical frequency of one span as a simply supported Euler beam",
-    )
-    table["measured_frequency"] = Variable(
-        dims=(), units="Hz", long_name="first vertical frequency measured on the line"
-    )
-    table["deflection"] = Variable(
-        dims=("t",),
-        units="m",
-        long_name="vertical deflection at midspan of the middle span under the train",
-    )
-    table["deflection_moving_load"] = Variable(
-        dims=("t",),
-        units="m",
-        long_name="vertical deflection at midspan under a moving uniform load, closed form",
-    )
-    table["static_deflection"] = Variable(
-        dims=(),
-        units="m",
-        long_name="largest vertical deflection at midspan of the middle span, train at rest",
-    )
-    table["static_deflection_moving_load"] = Variable(
-        dims=(),
-        units="m",
-        long_name="vertical deflection at midspan of a simply supported beam, uniform load",
-    )
-    table["passage_speed"] = Variable(dims=(), units="m s-1", long_name="speed of the train")
-    table["peak_deflection"] = Variable(
-        dims=("speed",),
-        units="m",
-        long_name="largest vertical deflection at midspan of the middle span",
-    )
-    table["dynamic_factor"] = Variable(
-        dims=("speed",),
-        units="1",
-        long_name="dynamic coefficient, largest deflection over static deflection",
-    )
-    table["dynamic_factor_moving_load"] = Variable(
-        dims=("speed",),
-        units="1",
-        long_name="dynamic coefficient of a simply supported beam under a moving uniform load",
-    )
-    table["passage_status"] = Variable(
-        dims=("speed",),
-        units="1",
-        long_name="how the passage ended",
-        dtype="int8",
-        flags=STATUS,
-    )
-    table["measured_deflection"] = Variable(
-        dims=("measured_speed",),
-        units="m",
-        long_name="largest vertical deflection at midspan measured on the line",
-    )
-    return table | _study_table()
-
-
 def _number(dims: str, units: str, long_name: str, dtype: str = "float64") -> Variable:
     """A variable on the dimensions that are named, with blanks between."""
     return Variable(dims=tuple(dims.split()), units=units, long_name=long_name, dtype=dtype)
 
 
-def _code(dims: str, long_name: str, meanings: tuple[str, ...]) -> Variable:
-    """A code on the dimensions that are named, counted from 0."""
+def _code(dims: str, long_name: str, meanings: tuple[str, ...] | Mapping[int, str]) -> Variable:
+    """A code on the dimensions that are named; meanings without numbers are counted from 0."""
     return Variable(
         dims=tuple(dims.split()),
         units="1",
         long_name=long_name,
         dtype="int8",
-        flags=dict(enumerate(meanings)),
+        flags=meanings if isinstance(meanings, Mapping) else dict(enumerate(meanings)),
     )
 
 
@@ -384,6 +116,126 @@ def _with_ends(
     for end, word in ((low, "lower"), (high, "upper")):
         meaning = f"{word} end of the confidence interval of the {of.long_name}"
         table[f"{name}_{end}"] = Variable(dims=of.dims, units=of.units, long_name=meaning)
+    return table
+
+
+def _model_table() -> dict[str, Variable]:
+    """Variables of the model: passages, irregularity, modes, deflection."""
+    table = {
+        "sample": _number("sample", "1", "number of the passage", "int64"),
+        "car": _number("car", "1", "number of the car, 0 at the nose", "int32"),
+        "magnet": _number("magnet", "1", "number of the magnet", "int32"),
+        "magnet_kind": _code("magnet", "kind of the magnet", {0: "suspension", 1: "guidance"}),
+        "magnet_side": _code(
+            "magnet", "side of the magnet, looking along travel", {-1: "left", 1: "right"}
+        ),
+        "magnet_x": _number(
+            "magnet", "m", "centre of the magnet along travel, from the nose of the train"
+        ),
+        "t": _number("t", "s", "time since the start of the passage"),
+        "x": _number("x", "m", "distance along travel from the first pier"),
+        "side": _code(
+            "side", "side of the guideway, looking along travel", {-1: "left", 1: "right"}
+        ),
+        "wavenumber": _number("wavenumber", "m-1", "wavenumber, one over the wavelength"),
+        "mode": _number("mode", "1", "number of the mode from the lowest", "int32"),
+        "speed": _number("speed", "m s-1", "speed of the train"),
+        "measured_speed": _number("measured_speed", "m s-1", "speed of the measured passage"),
+        "status": _code("sample", "how the passage ended", STATUS),
+        "lost_t": _number("sample", "s", "time at which levitation was lost"),
+        "lost_magnet": _number(
+            "sample", "1", "number of the magnet that lost levitation, -1 for none", "int32"
+        ),
+    }
+    for name, unit in GAIN_UNITS.items():
+        table[name] = _number("sample", unit, f"{name.replace('_', ' ')} of the magnets")
+    for name, meaning in RESPONSE_WORDS.items():
+        unit = RESPONSE_UNITS[name]
+        table[name] = _number("sample", unit, f"largest absolute {meaning}")
+        table[f"{name}_t"] = _number("sample", "s", f"time of the largest absolute {meaning}")
+        of_car = name.startswith("car_body")
+        table[f"{name}_history"] = _number(
+            "sample car t" if of_car else "sample t",
+            unit,
+            meaning.replace(", largest over the cars", ""),
+            "float32",
+        )
+        if of_car:
+            table[f"{name}_per_car"] = _number(
+                "sample car",
+                unit,
+                f"largest absolute {meaning.replace(', largest over the cars', '')}",
+            )
+    for kind in ("suspension", "guidance"):
+        for end, word in (("min", "smallest"), ("max", "largest")):
+            table[f"{kind}_gap_{end}"] = _number("sample", "m", f"{word} gap of any {kind} pole")
+        table[f"{kind}_current_max"] = _number(
+            "sample", "A", f"largest current of any {kind} magnet"
+        )
+    table["gap_history"] = _number(
+        "sample magnet t", "m", "mean gap of the magnet's poles", "float32"
+    )
+    table["current_history"] = _number(
+        "sample magnet t", "A", "mean current of the magnet's poles", "float32"
+    )
+    for direction in ("vertical", "lateral"):
+        table[f"irregularity_{direction}"] = _number(
+            "side x", "m", f"{direction} irregularity of the rail"
+        )
+        table[f"spectrum_{direction}"] = _number(
+            "wavenumber",
+            "m3",
+            f"one-sided spectrum of the {direction} irregularity, estimated by Welch",
+        )
+        table[f"target_{direction}"] = _number(
+            "wavenumber",
+            "m3",
+            f"one-sided spectrum that the {direction} irregularity is drawn from",
+        )
+        table[f"deviation_{direction}"] = _number(
+            "", "m", f"standard deviation of the {direction} irregularity"
+        )
+    table["frequency"] = _number("mode", "Hz", "natural frequency of the guideway")
+    table["direction"] = _code(
+        "mode",
+        "motion that holds most of the mode's kinetic energy",
+        {0: "longitudinal", 1: "lateral", 2: "vertical", 3: "torsion"},
+    )
+    for part, where in (("girder", "the girder axis"), ("rail", "the right rail")):
+        for axis, word in (("y", "lateral"), ("z", "vertical")):
+            table[f"{part}_shape_{axis}"] = _number(
+                "mode x", "1", f"{word} motion of {where} in the mode, largest of all four shapes 1"
+            )
+    table["frequency_simply_supported"] = _number(
+        "", "Hz", "first vertical frequency of one span as a simply supported Euler beam"
+    )
+    table["measured_frequency"] = _number("", "Hz", "first vertical frequency measured on the line")
+    table["deflection"] = _number(
+        "t", "m", "vertical deflection at midspan of the middle span under the train"
+    )
+    table["deflection_moving_load"] = _number(
+        "t", "m", "vertical deflection at midspan under a moving uniform load, closed form"
+    )
+    table["static_deflection"] = _number(
+        "", "m", "largest vertical deflection at midspan of the middle span, train at rest"
+    )
+    table["static_deflection_moving_load"] = _number(
+        "", "m", "vertical deflection at midspan of a simply supported beam, uniform load"
+    )
+    table["passage_speed"] = _number("", "m s-1", "speed of the train")
+    table["peak_deflection"] = _number(
+        "speed", "m", "largest vertical deflection at midspan of the middle span"
+    )
+    table["dynamic_factor"] = _number(
+        "speed", "1", "dynamic coefficient, largest deflection over static deflection"
+    )
+    table["dynamic_factor_moving_load"] = _number(
+        "speed", "1", "dynamic coefficient of a simply supported beam under a moving uniform load"
+    )
+    table["passage_status"] = _code("speed", "how the passage ended", STATUS)
+    table["measured_deflection"] = _number(
+        "measured_speed", "m", "largest vertical deflection at midspan measured on the line"
+    )
     return table
 
 
@@ -807,7 +659,7 @@ def _study_table() -> dict[str, Variable]:
     }
 
 
-VARIABLES: Mapping[str, Variable] = _table()
+VARIABLES: Mapping[str, Variable] = _model_table() | _study_table()
 """Every variable and coordinate of every file, by name."""
 
 
@@ -1132,12 +984,6 @@ def check(dataset: xr.Dataset, layout: str) -> None:
                 f"{layout}: '{name}' must be in '{expected.units}', "
                 f"got '{found.attrs.get('units')}'"
             )
-
-
-def file_hash(path: str | Path) -> str:
-    """SHA-256 of a file's bytes, in hexadecimal."""
-    with open(path, "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def provenance(

@@ -1,4 +1,4 @@
-"""Fingerprint of code: changes when the code does, not when its comments or docstrings do."""
+"""Fingerprints: of code, which changes when it does and not its docstrings; of files."""
 
 from __future__ import annotations
 
@@ -110,3 +110,9 @@ def code_of(*modules: str, without: Sequence[str] = ()) -> str:
         _, tree = _read(path.read_text(encoding="utf-8"))
         digest.update(f"{name}\n{tree}\n".encode())
     return digest.hexdigest()[:16]
+
+
+def file_hash(path: str | Path) -> str:
+    """SHA-256 of a file's bytes, in hexadecimal."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from maglev.vocabulary import GAIN_KEYS, Gain, Method, Response, Surrogate
+
 if TYPE_CHECKING:
     import pint
 
@@ -963,38 +965,8 @@ class Validation(Parameters):
         return self
 
 
-Response = Literal[
-    "girder_displacement_z",
-    "girder_displacement_y",
-    "girder_acceleration_z",
-    "girder_acceleration_y",
-    "car_body_acceleration_z",
-    "car_body_acceleration_y",
-]
-"""A response whose extreme a passage is judged by."""
-
-Gain = Literal[
-    "suspension_proportional",
-    "suspension_derivative",
-    "guidance_proportional",
-    "guidance_derivative",
-]
-"""A gain, named as in the section ``gains``."""
-
-Method = Literal["mcm", "osm", "asm_paper", "asm"]
-"""How the runs of a case are chosen: plain Monte Carlo, one-stage set, adaptive as published,
-adaptive towards the limits."""
-
-SurrogateKind = Literal["rbf", "scaled_rbf", "kriging", "best"]
+SurrogateKind = Literal[Surrogate, "best"]
 """A surrogate; ``best``: for each response the one with the least leave-one-out error."""
-
-_GAINS: tuple[Gain, ...] = (
-    "suspension_proportional",
-    "suspension_derivative",
-    "guidance_proportional",
-    "guidance_derivative",
-)
-
 
 _COUNTED = 2**14
 """Largest GF point set, and smallest number of points that count its Voronoi cells; assumed."""
@@ -1128,7 +1100,7 @@ class Case(Parameters):
         allow_inf_nan=False,
     )
     random_gains: tuple[Gain, ...] = Field(
-        _GAINS, description="gains that are random; the others stay at their means", min_length=1
+        GAIN_KEYS, description="gains that are random; the others stay at their means", min_length=1
     )
     methods: tuple[Method, ...] = Field(
         ("asm",), description="methods that the target `all` runs", min_length=1
@@ -1167,7 +1139,7 @@ class Case(Parameters):
 def _cases() -> dict[str, Case]:
     """The cases of the paper."""
     cases = {"validation": Case(methods=("mcm", "osm", "asm_paper", "asm"))}
-    for gain in _GAINS:
+    for gain in GAIN_KEYS:
         cases[f"only_{gain}"] = Case(n_spans=20, random_gains=(gain,))
     cases["all_gains"] = Case(n_spans=20)
     for percent in range(4, 16, 2):

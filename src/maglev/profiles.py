@@ -8,7 +8,8 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 
-from maglev.mechanics.irregularity import PROFILE_NAMES, FloatArray, Measured
+from maglev.arrays import FloatArray
+from maglev.mechanics.irregularity import PROFILE_NAMES, Measured
 
 _COLUMNS = ("x", "vertical", "lateral", "vertical_left", "lateral_left")
 _REQUIRED = _COLUMNS[:3]

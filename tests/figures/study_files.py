@@ -5,7 +5,8 @@ import xarray as xr
 from scipy import stats
 
 from maglev import datasets
-from maglev.datasets import GAINS, LAYOUTS, RESPONSES, VARIABLES
+from maglev.datasets import LAYOUTS, VARIABLES
+from maglev.vocabulary import GAINS, RESPONSES
 
 LEVELS = (0.1, 0.01, 0.001)
 MEAN = np.array([3500.0, 17.5, 4500.0, 17.5])

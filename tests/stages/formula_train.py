@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import warnings
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,16 @@ import synthetic
 
 from maglev.config import from_mapping
 from maglev.datasets import VARIABLES, describe
-from maglev.stages import design, points, runs, save
+from maglev.stages import (
+    baseline,
+    baseline_chunk,
+    baseline_points,
+    candidate_points,
+    design,
+    initial_points,
+    runs,
+)
+from maglev.vocabulary import GAINS
 
 MAPPING = {
     "study": {
@@ -58,7 +68,7 @@ class FormulaTrain:
         made = synthetic.runs(standard, loses=True).drop_vars(
             ["standard", "probability", "track_seed", "parameter"]
         )
-        for k, name in enumerate(points.GAINS):
+        for k, name in enumerate(GAINS):
             made[name] = ("sample", gains[:, k])
         seeds = np.zeros(len(gains)) if track_seeds is None else track_seeds % 1000
         made["girder_displacement_z"] = made["girder_displacement_z"] + 1e-9 * seeds
@@ -68,21 +78,26 @@ class FormulaTrain:
         return describe(made)
 
 
-def made(parameters, method, store, case="validation", baseline=None):
+def drawn(parameters, method, case="validation"):
+    """First points of a method, and the candidates of an adaptive one, by their roles."""
+    sets = {"initial_points": initial_points.dataset(parameters, case, method)}
+    if method != "osm":
+        sets["candidate_points"] = candidate_points.dataset(parameters, case, method)
+    return sets
+
+
+def made(parameters, method, store, case="validation", truth=None):
     """A baseline in chunks, or a design."""
     if method == "mcm":
-        drawn, size = points.dataset(parameters, case, "baseline"), parameters.study.mcm.chunk_size
-        n = drawn.sizes["sample"]
-        parts = [
-            runs.chunk(parameters, case, range(start, min(start + size, n)), store)
-            for start in range(0, n, size)
-        ]
-        return runs.gather(drawn, parts)
-    sets = {"initial": "osm" if method == "osm" else f"initial_{method}"}
-    if method != "osm":
-        sets["candidates"] = f"candidates_{method}"
-    drawn = {role: points.dataset(parameters, case, name) for role, name in sets.items()}
-    return design.dataset(parameters, case, method, drawn, store, baseline=baseline)
+        points, size = baseline_points.dataset(parameters, case), parameters.study.mcm.chunk_size
+        ends = np.minimum(np.arange(0, points.sizes["sample"] + size, size), points.sizes["sample"])
+        parts = {
+            (start, stop): baseline_chunk.dataset(parameters, case, start, stop, store)
+            for start, stop in pairwise(ends.tolist())
+        }
+        return baseline.dataset(parameters, points, parts)
+    sets = drawn(parameters, method, case)
+    return design.dataset(parameters, case, method, **sets, baseline=truth, store=store)
 
 
 def written(method, store, out):
@@ -90,9 +105,9 @@ def written(method, store, out):
     parameters = config()
     result = made(parameters, method, store)
     if method == "mcm":
-        save(result, out, "runs", parameters, case="validation")
+        baseline.STAGE.write(result, out, parameters, case="validation")
     else:
-        save(result, out, "design", parameters, case="validation", method=method)
+        design.STAGE.write(result, out, parameters, case="validation", method=method)
 
 
 def _killed(method, store, out, kill, n_runs):

@@ -4,10 +4,11 @@ import numpy as np
 import xarray as xr
 from scipy.stats import norm
 
-from maglev.datasets import DECISIONS, GAINS, LAYOUTS, RESPONSES, VARIABLES, describe
+from maglev.datasets import LAYOUTS, VARIABLES, describe
 from maglev.parameters import Config
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import gf_points
+from maglev.vocabulary import DECISIONS, GAINS, RESPONSES
 
 BORDER = -1.8
 """Gains below it in the first standard coordinate lose levitation."""

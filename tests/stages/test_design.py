@@ -9,20 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from formula_train import FormulaTrain, config, made
+from formula_train import config, drawn, made
 from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev import datasets
-from maglev.datasets import DECISIONS, RESPONSES
-from maglev.stages import design, points, runs
-
-
-@pytest.fixture
-def train(monkeypatch):
-    one = FormulaTrain()
-    monkeypatch.setattr(runs, "simulate", one)
-    monkeypatch.setattr(runs, "BATCH", 8)
-    return one
+from maglev.stages import design
+from maglev.vocabulary import DECISIONS, RESPONSES
 
 
 def values(dataset):
@@ -70,12 +62,9 @@ def test_rounds_are_those_asked_for(train, tmp_path):
     assert_array_equal(one["round_n_runs"], [24, 28, 32, 36])
     assert_array_equal(one["round_index"], np.repeat([0, 1, 2, 3], [24, 4, 4, 4]))
     assert len(np.unique(one["standard"].values, axis=0)) == 36
-    first = points.dataset(parameters, "validation", "initial_asm")
-    assert_array_equal(one["standard"][:24], first["standard"])
-    candidates = {
-        tuple(row)
-        for row in points.dataset(parameters, "validation", "candidates_asm")["standard"].values
-    }
+    sets = drawn(parameters, "asm")
+    assert_array_equal(one["standard"][:24], sets["initial_points"]["standard"])
+    candidates = {tuple(row) for row in sets["candidate_points"]["standard"].values}
     assert {tuple(row) for row in one["standard"].values[24:]} <= candidates
     assert np.isnan(one["score"][:24]).all()
     assert (one["score"][24:] >= 0).all()
@@ -98,13 +87,13 @@ def test_the_rmse_is_that_against_the_baseline_given(train, tmp_path):
     without = made(parameters, "osm", tmp_path)
     assert np.isnan(without["rmse"]).all()
     baseline = made(parameters, "mcm", tmp_path)
-    one = made(parameters, "osm", tmp_path, baseline=baseline)
+    one = made(parameters, "osm", tmp_path, truth=baseline)
     held, kept = (each["status"].values == 0 for each in (one, baseline))
     surrogate = design.fit_selected(one["standard"].values[held], values(one)[held], "rbf")
     off = surrogate.predict(baseline["standard"].values[kept]) - values(baseline)[kept]
     assert_allclose(one["rmse"][0], np.sqrt(np.mean(off**2, axis=0)), rtol=1e-9)
     grown = made(config(mcm={"n_samples": 40}), "mcm", tmp_path)
-    assert (made(parameters, "osm", tmp_path, baseline=grown)["rmse"] != one["rmse"]).all()
+    assert (made(parameters, "osm", tmp_path, truth=grown)["rmse"] != one["rmse"]).all()
 
 
 def test_no_run_is_made_twice_in_cases_that_are_alike(train, tmp_path):
@@ -135,11 +124,11 @@ def test_settled_limits_stop_the_tail_method(train, tmp_path):
 
 
 def test_what_cannot_be_designed_is_refused(train, tmp_path):
-    drawn = points.dataset(config(), "validation", "initial_asm")
+    initial, case = drawn(config(), "asm")["initial_points"], "validation"
     with pytest.raises(ValueError, match="method must be osm, asm_paper or asm, got 'mcm'"):
-        design.dataset(config(), "validation", "mcm", {"initial": drawn}, tmp_path)
+        design.dataset(config(), case, "mcm", initial, store=tmp_path)
     with pytest.raises(ValueError, match="the method 'asm' needs the points candidates"):
-        design.dataset(config(), "validation", "asm", {"initial": drawn}, tmp_path)
+        design.dataset(config(), case, "asm", initial, store=tmp_path)
     with pytest.raises(ValueError, match="have 4 random gains, expected 1 as in the case"):
-        design.dataset(config(), "only_guidance_derivative", "osm", {"initial": drawn}, tmp_path)
+        design.dataset(config(), "only_guidance_derivative", "osm", initial, store=tmp_path)
     assert train.n_runs == 0

@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 
 from maglev.config import from_mapping
 from maglev.datasets import LAYOUTS, VARIABLES
-from maglev.stages import dynamic_factor, save
+from maglev.stages import dynamic_factor, runs
+from maglev.vocabulary import GAINS
 
 CONFIG = from_mapping(
     {
@@ -24,7 +25,7 @@ class Simulated:
     def __init__(self, last=None):
         self.speeds, self.last = [], last
 
-    def __call__(self, config, gains):
+    def __call__(self, config, gains, n_threads):
         if self.last is not None and len(self.speeds) == self.last:
             raise KeyboardInterrupt
         self.speeds.append(config.passage.speed)
@@ -32,13 +33,14 @@ class Simulated:
         for name in LAYOUTS["passage"].variables:
             shape = tuple(config.train.n_cars if d == "car" else 1 for d in VARIABLES[name].dims)
             data[name] = (VARIABLES[name].dims, np.zeros(shape, dtype=VARIABLES[name].dtype))
+        data |= {name: (("sample",), gains[:, k]) for k, name in enumerate(GAINS)}
         data["girder_displacement_z"] = (("sample",), [1e-3 + 1e-6 * config.passage.speed])
-        return xr.Dataset(data, coords={"sample": [0], "car": [0]})
+        attributes = {"time_step": 1e-3, "n_steps": 10}
+        return xr.Dataset(data, coords={"sample": [0], "car": [0]}, attrs=attributes)
 
 
 @pytest.fixture
-def config(pytestconfig, monkeypatch):
-    monkeypatch.chdir(pytestconfig.rootpath / "config")
+def config(in_config_folder):
     return CONFIG
 
 
@@ -46,26 +48,26 @@ def test_a_stopped_sweep_goes_on_where_it_was_and_ends_in_the_same_bytes(
     config, tmp_path, monkeypatch
 ):
     undisturbed = Simulated()
-    monkeypatch.setattr(dynamic_factor, "simulate", undisturbed)
+    monkeypatch.setattr(runs, "simulate", undisturbed)
     whole = dynamic_factor.dataset(config, tmp_path / "whole")
     stopped, resumed = Simulated(last=4), Simulated()
-    monkeypatch.setattr(dynamic_factor, "simulate", stopped)
+    monkeypatch.setattr(runs, "simulate", stopped)
     with pytest.raises(KeyboardInterrupt):
         dynamic_factor.dataset(config, tmp_path / "store")
-    monkeypatch.setattr(dynamic_factor, "simulate", resumed)
+    monkeypatch.setattr(runs, "simulate", resumed)
     again = dynamic_factor.dataset(config, tmp_path / "store")
     assert stopped.speeds + resumed.speeds == undisturbed.speeds
     assert len(stopped.speeds) == 4
-    save(whole, tmp_path / "whole.nc", "dynamic_factor", config)
-    save(again, tmp_path / "again.nc", "dynamic_factor", config)
+    dynamic_factor.STAGE.write(whole, tmp_path / "whole.nc", config)
+    dynamic_factor.STAGE.write(again, tmp_path / "again.nc", config)
     assert (tmp_path / "whole.nc").read_bytes() == (tmp_path / "again.nc").read_bytes()
 
 
 def test_a_longer_sweep_computes_only_the_speeds_that_are_new(config, tmp_path, monkeypatch):
     first, more = Simulated(), Simulated()
-    monkeypatch.setattr(dynamic_factor, "simulate", first)
+    monkeypatch.setattr(runs, "simulate", first)
     dynamic_factor.dataset(config, tmp_path)
-    monkeypatch.setattr(dynamic_factor, "simulate", more)
+    monkeypatch.setattr(runs, "simulate", more)
     faster = config.validation.model_copy(update={"speed_max": 460 / 3.6})
     dynamic_factor.dataset(config.model_copy(update={"validation": faster}), tmp_path)
     assert_allclose(more.speeds, [460 / 3.6])
@@ -79,7 +81,7 @@ def test_both_ends_of_the_range_are_in_the_sweep(config):
 
 
 def test_the_coefficient_is_the_deflection_over_that_at_rest(config, tmp_path, monkeypatch):
-    monkeypatch.setattr(dynamic_factor, "simulate", Simulated())
+    monkeypatch.setattr(runs, "simulate", Simulated())
     result = dynamic_factor.dataset(config, tmp_path)
     assert_allclose(result["static_deflection"], 1.5e-3, rtol=0.1)
     assert_allclose(

@@ -2,29 +2,38 @@
 
 import numpy as np
 import pytest
-from formula_train import config
+from formula_train import config, drawn
 from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev import datasets
 from maglev.config import from_mapping
-from maglev.stages import points
+from maglev.stages import baseline_points, points, representative_points
 
 
 def test_every_set_has_its_layout_and_its_size():
+    parameters = config()
+    sets = {
+        "baseline": baseline_points.dataset(parameters, "validation"),
+        "representative": representative_points.dataset(parameters, "validation"),
+        **{f"osm {role}": one for role, one in drawn(parameters, "osm").items()},
+        **{f"paper {role}": one for role, one in drawn(parameters, "asm_paper").items()},
+        **{f"asm {role}": one for role, one in drawn(parameters, "asm").items()},
+    }
     expected = {
-        "baseline": 20, "representative": 64, "osm": 30, "initial_asm_paper": 16,
-        "candidates_asm_paper": 200, "initial_asm": 24, "candidates_asm": 512,
+        "baseline": 20, "representative": 64, "osm initial_points": 30,
+        "paper initial_points": 16, "paper candidate_points": 200,
+        "asm initial_points": 24, "asm candidate_points": 512,
     }  # fmt: skip
-    assert set(points.SETS) == set(expected)
+    assert set(sets) == set(expected)
     for name, n in expected.items():
-        one = points.dataset(config(), "validation", name)
+        one = sets[name]
         datasets.check(datasets.describe(one), "points")
         assert one.sizes == {"sample": n, "parameter": 4}
         assert_allclose(one["probability"].sum(), 1.0, rtol=1e-12)
 
 
 def test_gains_that_are_not_random_stay_at_their_means():
-    one = points.dataset(config(), "only_guidance_proportional", "osm")
+    one = drawn(config(), "osm", "only_guidance_proportional")["initial_points"]
     assert_array_equal(one["parameter"], [2])
     assert_array_equal(one["suspension_proportional_gain"], np.full(30, 3500.0))
     expected = 4500.0 * (1 + 0.1 * one["standard"].values[:, 0])
@@ -33,10 +42,8 @@ def test_gains_that_are_not_random_stay_at_their_means():
 
 
 def test_the_first_design_of_one_gain_is_smaller():
-    assert points.dataset(config(), "only_guidance_proportional", "initial_asm").sizes == {
-        "sample": 12,
-        "parameter": 1,
-    }
+    one = drawn(config(), "asm", "only_guidance_proportional")["initial_points"]
+    assert one.sizes == {"sample": 12, "parameter": 1}
 
 
 def test_a_sample_of_the_baseline_does_not_know_how_many_there_are():
@@ -52,16 +59,14 @@ def test_a_sample_of_the_baseline_does_not_know_how_many_there_are():
 
 
 def test_cases_with_the_same_random_gains_have_the_same_standard_points():
-    wide = points.dataset(config(), "cov_014", "initial_asm")
-    narrow = points.dataset(config(), "cov_004", "initial_asm")
+    wide = drawn(config(), "asm", "cov_014")["initial_points"]
+    narrow = drawn(config(), "asm", "cov_004")["initial_points"]
     assert_allclose(wide["standard"], narrow["standard"], rtol=1e-9, atol=1e-9)
     other_seed = from_mapping({"seed": 5, "study": {"n_counting": 16384}})
-    other = points.dataset(other_seed, "cov_004", "initial_asm")
+    other = drawn(other_seed, "asm", "cov_004")["initial_points"]
     assert np.abs(other["standard"].values[:24] - narrow["standard"].values).max() > 0.1
 
 
-def test_an_unknown_case_or_set_is_refused():
+def test_an_unknown_case_is_refused():
     with pytest.raises(ValueError, match="there is no case 'al', known are: validation, only_"):
-        points.dataset(config(), "al", "osm")
-    with pytest.raises(ValueError, match="there is no point set 'lhs', known are: baseline"):
-        points.dataset(config(), "validation", "lhs")
+        drawn(config(), "osm", "al")

@@ -5,10 +5,10 @@ import pytest
 import synthetic
 from numpy.testing import assert_allclose
 
-from maglev.datasets import TRAIN_PARTS, check, describe
+from maglev.datasets import check, describe
 from maglev.parameters import Config
-from maglev.stages import density, prediction, stability, surrogate, train_modes
-from maglev.uncertainty.gdee import direct_density
+from maglev.stages import prediction, stability, surrogate, train_modes
+from maglev.vocabulary import TRAIN_PARTS
 
 CONFIG = synthetic.CONFIG
 
@@ -89,24 +89,3 @@ def test_lateral_and_yaw_modes_of_the_car_body_are_damped_as_a_secondary_suspens
         assert_allclose(by_name[name], (frequency, ratio), rtol=5e-3)
     for name in ("car_body_lateral", "car_body_yaw"):
         assert 0.10 < by_name[name][1] < 0.25
-
-
-def test_the_band_of_a_density_is_that_of_repeated_samples():
-    rng, n, lost = np.random.default_rng(2), 400, 0.1
-    at, h = np.linspace(-2.5, 2.5, 9), 0.3
-    made = []
-    for _ in range(600):
-        values = rng.standard_normal(rng.binomial(n, 1 - lost))
-        share = 1 - values.size / n
-        made.append(direct_density(at, values, bandwidth=h, lost_probability=share))
-    sample = rng.standard_normal(40_000)  # what the band is estimated from, here without its noise
-    column = {
-        "value": at,
-        "density_direct": np.mean(made, axis=0),
-        "bandwidth": h,
-    }
-    low, high = density.density_band(column, sample, lost, n, 0.95)
-    deviation = (high - column["density_direct"]) / 1.959964
-    assert (low >= 0).all()
-    assert_allclose(deviation, np.std(made, axis=0), rtol=0.12)
-    assert np.mean(deviation / np.std(made, axis=0)) == pytest.approx(1.0, abs=0.05)

@@ -5,21 +5,13 @@ import signal
 import numpy as np
 import pytest
 import xarray as xr
-from formula_train import FormulaTrain, config, in_a_process, made, written
+from formula_train import config, in_a_process, made, written
 from numpy.testing import assert_array_equal
 
-from maglev import datasets, simulate
+from maglev import datasets, simulate, vocabulary
 from maglev.config import from_mapping
-from maglev.stages import points, runs
+from maglev.stages import baseline, baseline_chunk, baseline_points, points, track_runs
 from maglev.stages.runs import stored_runs
-
-
-@pytest.fixture
-def train(monkeypatch):
-    one = FormulaTrain()
-    monkeypatch.setattr(runs, "simulate", one)
-    monkeypatch.setattr(runs, "BATCH", 8)
-    return one
 
 
 def test_a_stored_run_is_the_run_itself(tmp_path):
@@ -114,8 +106,8 @@ def test_a_killed_baseline_resumes_to_the_same_bytes(train, tmp_path, kill, n_do
 def test_parts_of_a_random_track_share_gains_and_tracks(train, tmp_path):
     parameters = config()
     both = made(parameters, "mcm", tmp_path, case="moving")
-    part = {name: runs.track_part(parameters, "moving", name, tmp_path)
-            for name in datasets.TRACK_PARTS}  # fmt: skip
+    part = {name: track_runs.dataset(parameters, "moving", name, tmp_path)
+            for name in vocabulary.TRACK_PARTS}  # fmt: skip
     for one in part.values():
         datasets.check(datasets.describe(one), "runs")
         assert one.sizes["sample"] == 6
@@ -133,21 +125,22 @@ def test_parts_of_a_random_track_share_gains_and_tracks(train, tmp_path):
 
 
 def test_what_cannot_be_run_is_refused(train, tmp_path):
-    drawn = points.dataset(config(), "validation", "baseline")
+    drawn = baseline_points.dataset(config(), "validation")
     with pytest.raises(ValueError, match=r"samples must be numbered upwards from 0 or more, got"):
-        runs.chunk(config(), "validation", range(5, 5), tmp_path)
+        baseline_chunk.dataset(config(), "validation", 5, 5, tmp_path)
     with pytest.raises(ValueError, match=r"gains have shape \(0, 4\), expected \(sample, 4\)"):
         stored_runs(config(), np.empty((0, 4)), tmp_path)
     with pytest.raises(ValueError, match=r"track_seeds have shape \(2,\), expected \(sample,\)"):
         stored_runs(config(), np.ones((1, 4)), tmp_path, track_seeds=[1, 2])
     with pytest.raises(ValueError, match=r"cases\.validation\.random_track must be true"):
-        runs.track_part(config(), "validation", "track_only", tmp_path)
+        track_runs.dataset(config(), "validation", "track_only", tmp_path)
     with pytest.raises(ValueError, match="part must be one of gains_only, track_only"):
-        runs.track_part(config(), "moving", "both", tmp_path)
-    one = runs.chunk(config(), "validation", range(10, 20), tmp_path)
+        track_runs.dataset(config(), "moving", "both", tmp_path)
+    one = baseline_chunk.dataset(config(), "validation", 10, 20, tmp_path)
     with pytest.raises(ValueError, match="the chunks must hold the samples 0 to 19 once each"):
-        runs.gather(drawn, [one])
-    whole = runs.chunk(config(), "validation", range(20), tmp_path)
+        baseline.dataset(config(), drawn, {(10, 20): one})
+    whole = baseline_chunk.dataset(config(), "validation", 0, 20, tmp_path)
     with pytest.raises(ValueError, match="must have been run at the points of the baseline"):
-        runs.gather(drawn, [whole.assign(standard=whole["standard"] + 1e-9)])
+        moved = whole.assign(standard=whole["standard"] + 1e-9)
+        baseline.dataset(config(), drawn, {(0, 20): moved})
     assert train.n_runs == 20

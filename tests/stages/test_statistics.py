@@ -7,15 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import binom, norm
 from synthetic import BORDER, CONFIG, P_LOST
 
-from maglev.datasets import (
-    DENSITY_METHODS,
-    LIMIT_STATUS,
-    METHODS,
-    RESPONSES,
-    SURROGATES,
-    check,
-    describe,
-)
+from maglev.datasets import check, describe
 from maglev.stages import (
     accuracy,
     density,
@@ -28,7 +20,7 @@ from maglev.stages import (
     tables,
     track_split,
 )
-from maglev.uncertainty.selection import KINDS
+from maglev.vocabulary import DENSITY_METHODS, LIMIT_STATUS, METHODS, RESPONSES
 
 LEVELS = np.array(CONFIG.study.failure_probability)
 
@@ -55,10 +47,6 @@ def held():
 def losing():
     """The files of a design with lost runs."""
     return chain(n=100, loses=True)
-
-
-def test_kinds_have_one_order_in_files_and_package():
-    assert SURROGATES == KINDS
 
 
 @pytest.mark.parametrize("name", ["surrogate", "eev", "density", "limits"])
@@ -338,7 +326,7 @@ def test_a_level_that_a_half_cannot_carry_is_not_decided():
 
 def test_table_1_holds_every_limit_and_says_where_there_is_none(by_method):
     _, found = by_method
-    table = describe(table1.dataset(found))
+    table = describe(table1.dataset(CONFIG, found))
     check(table, "table1")
     rows = table1.rows(table)
     assert len(rows) == 6 * 3 * 3
@@ -347,9 +335,9 @@ def test_table_1_holds_every_limit_and_says_where_there_is_none(by_method):
     text = table1.text(table, "Table 1")
     assert "| girder_displacement_z [m] | 0.2 | " in text
     assert text.count("none, losses are likelier") == 6 * 3
-    assert table1.dataset({"asm": found["asm"]}).sizes["method"] == 1
+    assert table1.dataset(CONFIG, {"asm": found["asm"]}).sizes["method"] == 1
     with pytest.raises(ValueError, match="same failure probabilities"):
-        table1.dataset(found | {"asm": found["asm"].isel(failure_probability=slice(2))})
+        table1.dataset(CONFIG, found | {"asm": found["asm"].isel(failure_probability=slice(2))})
 
 
 def test_the_papers_numbers_stand_beside_ours_with_reasons_from_the_files(held):
@@ -358,7 +346,7 @@ def test_the_papers_numbers_stand_beside_ours_with_reasons_from_the_files(held):
     judged = accuracy.dataset(CONFIG, runs, designs)
     shown = density.of_baseline(CONFIG, runs)
     densities = {"mcm": shown, "osm": held["density"], "asm": held["density"]}
-    table = describe(paper_and_ours.dataset(densities, designs, judged))
+    table = describe(paper_and_ours.dataset(CONFIG, densities, designs, judged))
     check(table, "paper_and_ours")
     peak = float(held["density"]["peak"][0])
     assert table["paper_peak"][1, METHODS.index("osm")] == peak
@@ -374,7 +362,7 @@ def test_the_papers_numbers_stand_beside_ours_with_reasons_from_the_files(held):
     text = paper_and_ours.text(table, "Paper and ours")
     assert "| mcm | 63700 | " in text and "nan" not in text
     with pytest.raises(ValueError, match="compared with a baseline"):
-        paper_and_ours.dataset({"asm": held["density"]}, designs, judged)
+        paper_and_ours.dataset(CONFIG, {"asm": held["density"]}, designs, judged)
 
 
 def test_tables_are_marked_where_they_are_no_result(tmp_path):

@@ -5,10 +5,8 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose
 
-from maglev import datasets
 from maglev.config import from_mapping
-from maglev.parameters import Config
-from maglev.stages import SECTIONS, config_slice, deflection, irregularity, modes
+from maglev.stages import deflection, guideway_modes, irregularity
 
 SMALL = from_mapping(
     {
@@ -19,33 +17,7 @@ SMALL = from_mapping(
 )
 
 
-@pytest.fixture(autouse=True)
-def _beside_the_measurements(pytestconfig, monkeypatch):
-    monkeypatch.chdir(pytestconfig.rootpath / "config")
-
-
-def only(config, stage):
-    """The configuration with nothing in it but what the stage says it reads."""
-    tops = {dotted.split(".")[0] for dotted in SECTIONS[stage]}
-    return Config.model_construct(_fields_set=tops, **{top: getattr(config, top) for top in tops})
-
-
-def stripped(config, stage):
-    bare = only(config, stage)
-    for name in set(Config.model_fields) - bare.model_fields_set:
-        bare.__dict__.pop(name, None)
-    return bare
-
-
-def test_a_stage_finds_all_it_needs_in_what_it_says_it_reads():
-    datasets.describe(irregularity.dataset(stripped(SMALL, "irregularity")))
-    datasets.describe(modes.dataset(stripped(SMALL, "modes")))
-
-
-def test_a_slice_keeps_the_nesting_of_the_configuration():
-    part = config_slice(SMALL.quantities(), "modes")
-    assert part["validation"] == {"measurements": "measurements/shanghai.yaml"}
-    assert set(part) == {"demonstration", "guideway", "validation"}
+pytestmark = pytest.mark.usefixtures("in_config_folder")
 
 
 def test_the_spectrum_of_the_sample_lies_on_the_target():
@@ -65,7 +37,7 @@ def test_a_smooth_track_has_no_irregularity():
 
 
 def test_the_first_vertical_mode_is_a_little_below_that_of_a_simply_supported_beam():
-    result = modes.dataset(SMALL)
+    result = guideway_modes.dataset(SMALL)
     vertical = result["frequency"].where(result["direction"] == 2, drop=True)
     assert 8.3 < float(vertical[0]) < float(result["frequency_simply_supported"]) < 9.0
     assert float(abs(result["girder_shape_z"]).max()) <= 1 + 1e-12

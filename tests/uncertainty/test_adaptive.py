@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from maglev.uncertainty.adaptive import AdaptiveState, absorb, propose, stop_reason
+from maglev.uncertainty.adaptive import AdaptiveState, absorb, decision, propose
 from maglev.uncertainty.kriging import fit_kriging
 from maglev.uncertainty.learning import predicted_limits, tail_batch, taylor_batch
 from maglev.uncertainty.rbf import fit_rbf
@@ -104,22 +104,22 @@ def test_round_of_lost_samples_proves_nothing():
     state = absorb(state, [[-4.0, 0.0]], NAN, np.array([True]), [[1.0, 1.0]])
     assert_array_equal(state.tested, [False, False])
     assert np.isnan(state.error[1]).all()
-    assert stop_reason(state, threshold=1e9, n_rounds=1, n_largest=1000) is None
+    assert decision(state, threshold=1e9, n_rounds=1, n_largest=1000) == "go_on"
 
 
 def test_stops_only_after_successive_quiet_rounds():
     state = absorb(AdaptiveState.empty(2, 2), FIRST, *model(FIRST))
     scale = np.std(state.values[~state.lost], axis=0)
-    quiet = partial(stop_reason, threshold=0.1, n_rounds=2, n_largest=25)
+    quiet = partial(decision, threshold=0.1, n_rounds=2, n_largest=25)
     reasons = []
     for place, error in enumerate([0.05, 0.2, 0.05, 0.1 - 1e-9]):
         values = np.ones((1, 2))
         predicted = values + error * scale * [0.5, 1.0]
         state = absorb(state, CANDIDATES[[place]], values, None, predicted)
         reasons.append(quiet(state))
-    assert reasons == [None, None, None, "error below threshold"]
+    assert reasons == ["go_on", "go_on", "go_on", "error_below_threshold"]
     state = absorb(state, CANDIDATES[[9]], np.ones((1, 2)), None, np.ones((1, 2)) + scale)
-    assert quiet(state) == "largest number of runs"
+    assert quiet(state) == "largest_number_of_runs"
 
 
 def test_adaptive_tail_limits_beat_the_first_design():
@@ -169,4 +169,4 @@ def test_unusable_histories_and_settings_are_refused():
     with pytest.raises(ValueError, match="response 0 must vary over the first design"):
         absorb(level, [[3.0, 1.0]], [[1.0, 1.0]], None, [[1.0, 1.0]])
     with pytest.raises(ValueError, match="must be positive, got"):
-        stop_reason(empty, threshold=0.0, n_rounds=2, n_largest=9)
+        decision(empty, threshold=0.0, n_rounds=2, n_largest=9)

@@ -31,17 +31,6 @@ def test_standard_form_of_a_normal_input_is_the_standard_normal():
     assert_allclose(u[:, 0], [-3.090232306167813, 0.0, 1.0], atol=1e-12)
 
 
-def test_joint_density_is_the_product_and_integrates_to_one():
-    u = np.linspace(-8.0, 8.0, 401)
-    grid = np.stack(np.meshgrid(u, u, indexing="ij"), axis=-1)
-    density = Marginals([stats.norm(3.0, 0.5), stats.gumbel_r(1.0, 2.0)]).density_standard(grid)
-    assert_allclose(density.sum() * (u[1] - u[0]) ** 2, 1.0, atol=1e-4)
-    # gumbel_r has the density exp(-1) / scale at its mode and the deviation scale pi / sqrt(6)
-    at_mode = Marginals([stats.gumbel_r(1.0, 2.0)])
-    u_mode = at_mode.to_standard([1.0])
-    assert_allclose(at_mode.density_standard(u_mode), np.exp(-1) * np.pi / np.sqrt(6), rtol=1e-12)
-
-
 def test_correlated_inputs_are_refused_and_the_identity_is_not():
     two = [stats.norm(), stats.norm()]
     assert Marginals(two, correlation=np.eye(2)).n == 2

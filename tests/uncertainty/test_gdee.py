@@ -8,6 +8,7 @@ from scipy import stats
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.gdee import (
     direct_density,
+    direct_density_band,
     evolved_density,
     first_passage,
     silverman_bandwidth,
@@ -200,3 +201,22 @@ def test_faulty_histories_are_refused():
             first_passage(faulty, mesh=0.1, **options)
     with pytest.raises(ValueError, match="mesh must be positive"):
         first_passage(histories, mesh=-0.1, upper=1.0)
+
+
+def test_the_band_of_a_density_is_that_of_repeated_samples():
+    rng, n, lost = np.random.default_rng(2), 400, 0.1
+    at, h = np.linspace(-2.5, 2.5, 9), 0.3
+    made = []
+    for _ in range(600):
+        values = rng.standard_normal(rng.binomial(n, 1 - lost))
+        share = 1 - values.size / n
+        made.append(direct_density(at, values, bandwidth=h, lost_probability=share))
+    sample = rng.standard_normal(40_000)  # what the band is estimated from, here without its noise
+    density = np.mean(made, axis=0)
+    low, high = direct_density_band(
+        at, sample, n, density=density, bandwidth=h, lost_probability=lost
+    )
+    deviation = (high - density) / 1.959964
+    assert (low >= 0).all()
+    assert_allclose(deviation, np.std(made, axis=0), rtol=0.12)
+    assert np.mean(deviation / np.std(made, axis=0)) == pytest.approx(1.0, abs=0.05)

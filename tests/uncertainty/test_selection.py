@@ -7,8 +7,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from maglev.uncertainty import selection
 from maglev.uncertainty.kriging import conditioned_kriging, fit_kriging
 from maglev.uncertainty.rbf import fit_rbf, fit_scaled_rbf
-from maglev.uncertainty.selection import CHOICES, KINDS, fit_selected, rebuilt
+from maglev.uncertainty.selection import CHOICES, fit_selected, rebuilt
 from maglev.uncertainty.surrogate import relative_error
+from maglev.vocabulary import SURROGATES
 
 POINTS = np.random.default_rng(30).standard_normal((40, 2))
 ELSEWHERE = np.random.default_rng(31).standard_normal((15, 2))
@@ -22,7 +23,7 @@ VALUES = np.column_stack(
 SINGLE = {"rbf": fit_rbf, "scaled_rbf": fit_scaled_rbf, "kriging": fit_kriging}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SURROGATES)
 def test_a_named_kind_is_that_surrogate(kind):
     chosen, alone = fit_selected(POINTS, VALUES, kind), SINGLE[kind](POINTS, VALUES)
     assert chosen.kinds == (kind,) * 3
@@ -37,8 +38,8 @@ def test_a_named_kind_is_that_surrogate(kind):
 
 def test_best_has_the_smallest_leave_one_out_error_of_all_in_every_response():
     best = fit_selected(POINTS, VALUES, "best")
-    errors = np.array([relative_error(SINGLE[kind](POINTS, VALUES)) for kind in KINDS])
-    assert best.kinds == tuple(KINDS[k] for k in errors.argmin(axis=0))
+    errors = np.array([relative_error(SINGLE[kind](POINTS, VALUES)) for kind in SURROGATES])
+    assert best.kinds == tuple(SURROGATES[k] for k in errors.argmin(axis=0))
     assert len(set(best.kinds)) > 1  # else the responses say nothing about the choice
     assert_allclose(relative_error(best), errors.min(axis=0), rtol=1e-6)
 

@@ -1,61 +1,134 @@
-# What the rules need to know of the configuration: names of stages, files of runs and of points.
-
-import re
-
-
-def stages(needs: str, lacks: str) -> str:
-    """Pattern of the stages that read something of a case or a method, and nothing of another."""
-    found = (
-        re.escape(stage)
-        for stage, sections in SECTIONS.items()
-        if any(needs in one for one in sections)
-        and not any(lacks in one for one in sections)
-    )
-    return "|".join(found)
+# What the rules of the stages need to know: which cases and methods there are, where files lie, and
+# what the command of a stage is given.
 
 
 STORE = f"results/.store/{config['run']}"
-CHUNK = parameters.study.mcm.chunk_size
-PROFILE = config["irregularity"]["profile_file"] or []
+TABLE_CASE = "validation"
 
 
-def n_samples(case: str) -> int:
-    """Number of runs of the baseline of a case."""
-    return parameters.cases[case].n_samples or parameters.study.mcm.n_samples
+def methods_of(case: str, among: tuple[str, ...] = METHODS) -> list[str]:
+    """Methods that a case names, of some."""
+    named = parameters.cases[case].methods if case in parameters.cases else ()
+    return [one for one in among if one in named]
 
 
-def chunks(wildcards) -> list[str]:
-    """Files of the baseline of a case."""
-    n = -(-n_samples(wildcards.case) // CHUNK)
-    return [f"<results>/{wildcards.case}/mcm/chunk_{k:03d}.nc" for k in range(n)]
+def checked_cases(every: bool) -> list[str]:
+    """Cases whose statistics can be checked: with a baseline of their own, or all."""
+    return [
+        case
+        for case in parameters.cases
+        if not parameters.cases[case].random_track
+        and (every or BASELINE in methods_of(case))
+    ]
 
 
-def runs_of_all_cases() -> list[str]:
-    """Baselines and designs of all cases by the methods that they name."""
-    files = []
-    for name, case in parameters.cases.items():
-        for method in case.methods:
-            file = "mcm.nc" if method == "mcm" else f"{method}/design.nc"
-            files.append(f"<results>/{name}/{file}")
-        if case.random_track:
-            files += [f"<results>/{name}/track/{part}.nc" for part in TRACK_PARTS]
-    return files
+def place(stage: str, **names: str) -> str:
+    """Where a file of a stage lies, for such names of its wildcards."""
+    return f"<results>/{FILES[stage]}".format(**names)
 
 
-def initial(wildcards) -> str:
-    """Points of the first design of a method."""
-    name = "osm" if wildcards.method == "osm" else f"initial_{wildcards.method}"
-    return f"<results>/{wildcards.case}/points/{name}.nc"
+def case_of(wildcards) -> str:
+    """The case that a job is about; tables are about one case."""
+    return wildcards.get("case", TABLE_CASE)
 
 
-def candidates(wildcards) -> list[str]:
-    """Points that the rounds of a method choose from, none for a method without rounds."""
-    if wildcards.method == "osm":
-        return []
-    return [f"<results>/{wildcards.case}/points/candidates_{wildcards.method}.nc"]
+def config_of(stage, case: str, method: str | None) -> str:
+    """File of the part of the configuration that a stage reads."""
+    folder = {"run": "", "case": f"{case}/", "method": f"{case}/{method}/"}
+    return f"<results>/{folder[stage.reads_of]}config/{stage.name}.yaml"
 
 
-def baseline(wildcards) -> list[str]:
-    """Runs that the rounds are compared with, if the case has them."""
-    has_one = "mcm" in parameters.cases[wildcards.case].methods
-    return [f"<results>/{wildcards.case}/mcm.nc"] if has_one else []
+def stages_reading(of: str) -> str:
+    """Pattern of the stages that read the same in a run, in each case or for each method."""
+    return "|".join(name for name, stage in STAGES.items() if stage.reads_of == of)
+
+
+def chunks(case: str) -> list[dict[str, str]]:
+    """First sample and sample after the last of the chunks of a baseline."""
+    n, size = n_samples(parameters, case), parameters.study.mcm.chunk_size
+    return [
+        {"start": str(start), "stop": str(min(start + size, n))}
+        for start in range(0, n, size)
+    ]
+
+
+def names_of(role: str, by: tuple[str, ...], wildcards) -> list[dict[str, str]]:
+    """Names of the files of a role that has many."""
+    case, every = case_of(wildcards), wildcards.get("scope") == "statistics_truth"
+    return {
+        ("method",): lambda: [
+            {"method": method} for method in methods_of(case, STAGES[role].methods)
+        ],
+        ("part",): lambda: [{"part": part} for part in TRACK_PARTS],
+        ("start", "stop"): lambda: chunks(case),
+        ("case",): lambda: [{"case": case} for case in checked_cases(every)],
+        ("case", "method"): lambda: [
+            {"case": case, "method": method}
+            for case in checked_cases(every)
+            for method in methods_of(case, DESIGNED)
+        ],
+    }[by]()
+
+
+def places_of(stage, wildcards) -> dict[str, list[tuple[dict[str, str], str]]]:
+    """Files of every role of a stage, each with its names."""
+    found = {}
+    own = {"case": case_of(wildcards), "method": wildcards.get("method")}
+    for role, one in stage.roles(own["method"]).items():
+        if one.by:
+            names = names_of(role, one.by, wildcards)
+        elif one.optional and not methods_of(own["case"], STAGES[role].methods):
+            continue
+        else:
+            names = [{}]
+        found[role] = [(each, place(role, **{**own, **each})) for each in names]
+    return found
+
+
+def inputs_of(stage):
+    """Function that finds the inputs of a stage: configuration, what it names, and every role."""
+
+    def found(wildcards) -> dict[str, str | list[str]]:
+        of = {"case": case_of(wildcards), "method": wildcards.get("method")}
+        files = {
+            role: [path for _, path in places]
+            for role, places in places_of(stage, wildcards).items()
+        }
+        named = stage.files(parameters, **of)
+        return {"config": config_of(stage, **of), **named, **files}
+
+    return found
+
+
+def options_of(stage):
+    """Function that writes the options of the command of a stage, but for threads and output."""
+
+    def written(wildcards, input) -> str:
+        given = {"case": case_of(wildcards), "store": STORE, **dict(wildcards.items())}
+        places = places_of(stage, wildcards)
+        words = []
+        for option in stage.options:
+            if option == "config":
+                words += [flag(option), input.config]
+            elif option in places:
+                for (names, _), path in zip(places[option], input[option], strict=True):
+                    words += [flag(option), *names.values(), path]
+            elif option in given:
+                words += [flag(option), given[option]]
+        return " ".join(words)
+
+    return written
+
+
+def outputs_of(stage) -> list[str]:
+    """The file of a stage, and its table as text if it has one."""
+    stem = f"<results>/{FILES[stage.name].removesuffix('.nc')}"
+    return [
+        f"{stem}{end}" for end in (".nc", *((".csv", ".md") if stage.table else ()))
+    ]
+
+
+def message_of(stage) -> str:
+    """What a job of a stage does, and for which names."""
+    names = re.findall(r"{(\w+)}", FILES[stage.name])
+    return f"{SUMMARIES[stage.name]} {' '.join(f'{{wildcards.{n}}}' for n in names)}"

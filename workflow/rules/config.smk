@@ -23,12 +23,13 @@ rule stage_config:
     log:
         "<logs>/config/{stage}.log",
     wildcard_constraints:
-        stage=stages(needs="", lacks="{case}"),
+        stage=stages_reading("run"),
     conda:
         "../envs/maglev.yaml"
     params:
         text=lambda wildcards: config_text(
-            config_slice(config, wildcards.stage), f"results/{config['run']}/config"
+            STAGES[wildcards.stage].slice(parameters),
+            f"results/{config['run']}/config",
         ),
     message:
         "Write what the stage '{wildcards.stage}' reads of the configuration"
@@ -42,12 +43,12 @@ rule case_config:
     log:
         "<logs>/{case}/config/{stage}.log",
     wildcard_constraints:
-        stage=stages(needs="{case}", lacks="{method}"),
+        stage=stages_reading("case"),
     conda:
         "../envs/maglev.yaml"
     params:
         text=lambda wildcards: config_text(
-            config_slice(config, wildcards.stage, wildcards.case),
+            STAGES[wildcards.stage].slice(parameters, wildcards.case),
             f"results/{config['run']}/{wildcards.case}/config",
         ),
     message:
@@ -62,12 +63,14 @@ rule method_config:
     log:
         "<logs>/{case}/{method}/config/{stage}.log",
     wildcard_constraints:
-        stage=stages(needs="{case}", lacks="-"),
+        stage=stages_reading("method"),
     conda:
         "../envs/maglev.yaml"
     params:
         text=lambda wildcards: config_text(
-            config_slice(config, wildcards.stage, wildcards.case, wildcards.method),
+            STAGES[wildcards.stage].slice(
+                parameters, wildcards.case, wildcards.method
+            ),
             f"results/{config['run']}/{wildcards.case}/{wildcards.method}/config",
         ),
     message:

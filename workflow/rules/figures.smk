@@ -1,122 +1,123 @@
 # One rule per figure: PNG, PDF, and the numbers in it as NetCDF, from files already computed.
 
-
-rule fig7:
-    input:
-        "<results>/track/irregularity.nc",
-    output:
-        multiext("<results>/figures/fig7", ".png", ".pdf", ".nc"),
-    log:
-        "<logs>/fig7.log",
-    benchmark:
-        "<benchmarks>/fig7.tsv"
-    conda:
-        "../envs/maglev.yaml"
-    params:
-        out=subpath(output[0], strip_suffix=".png"),
-        code=code_of("figures", "figures.irregularity"),
-    message:
-        "Draw Fig. 7: track irregularity and its spectra"
-    shell:
-        "maglev figure irregularity {input} --out {params.out} 2> {log}"
-
-
-rule fig8:
-    input:
-        "<results>/validation/deflection.nc",
-        "<results>/validation/dynamic_factor.nc",
-    output:
-        multiext("<results>/figures/fig8", ".png", ".pdf", ".nc"),
-    log:
-        "<logs>/fig8.log",
-    benchmark:
-        "<benchmarks>/fig8.tsv"
-    conda:
-        "../envs/maglev.yaml"
-    params:
-        out=subpath(output[0], strip_suffix=".png"),
-        code=code_of("figures", "figures.deflection"),
-    message:
-        "Draw Fig. 8: midspan deflection and dynamic coefficient"
-    shell:
-        "maglev figure deflection {input} --out {params.out} 2> {log}"
-
-
-rule histories:
-    input:
-        "<results>/validation/passage.nc",
-    output:
-        multiext("<results>/figures/histories", ".png", ".pdf", ".nc"),
-    log:
-        "<logs>/histories.log",
-    benchmark:
-        "<benchmarks>/histories.tsv"
-    conda:
-        "../envs/maglev.yaml"
-    params:
-        out=subpath(output[0], strip_suffix=".png"),
-        code=code_of("figures", "figures.histories"),
-    message:
-        "Draw the histories of the six responses"
-    shell:
-        "maglev figure histories {input} --out {params.out} 2> {log}"
-
-
-rule gaps:
-    input:
-        "<results>/validation/passage.nc",
-    output:
-        multiext("<results>/figures/gaps", ".png", ".pdf", ".nc"),
-    log:
-        "<logs>/gaps.log",
-    benchmark:
-        "<benchmarks>/gaps.tsv"
-    conda:
-        "../envs/maglev.yaml"
-    params:
-        out=subpath(output[0], strip_suffix=".png"),
-        code=code_of("figures", "figures.gaps"),
-    message:
-        "Draw the gaps and currents of the magnets"
-    shell:
-        "maglev figure gaps {input} --out {params.out} 2> {log}"
-
-
-rule modes:
-    input:
-        "<results>/guideway/modes.nc",
-    output:
-        multiext("<results>/figures/modes", ".png", ".pdf", ".nc"),
-    log:
-        "<logs>/modes.log",
-    benchmark:
-        "<benchmarks>/modes.tsv"
-    conda:
-        "../envs/maglev.yaml"
-    params:
-        out=subpath(output[0], strip_suffix=".png"),
-        code=code_of("figures", "figures.modes"),
-    message:
-        "Draw the guideway's modes and frequencies"
-    shell:
-        "maglev figure modes {input} --out {params.out} 2> {log}"
+# figure: the module that draws it, what it shows, and the files it is drawn from
+DRAWN = {
+    "fig7": (
+        "irregularity",
+        "track irregularity and its spectra",
+        [place("irregularity")],
+    ),
+    "fig8": (
+        "deflection",
+        "midspan deflection and dynamic coefficient",
+        [place("deflection"), place("dynamic_factor")],
+    ),
+    "histories": ("histories", "histories of the six responses", [place("passage")]),
+    "gaps": ("gaps", "gaps and currents of the magnets", [place("passage")]),
+    "modes": (
+        "modes",
+        "modes and frequencies of the guideway",
+        [place("guideway_modes")],
+    ),
+    "fig_train_modes": (
+        "train_modes",
+        "frequencies and damping of the train's modes",
+        [place("train_modes")],
+    ),
+    "fig9": (
+        "training",
+        "errors against the number of training runs",
+        of_judged("accuracy")
+        and [
+            *of_judged("accuracy"),
+            *of_methods("design", TABLE_CASE),
+        ],
+    ),
+    "fig10": (
+        "prediction",
+        "predicted against computed extremes",
+        of_judged("prediction"),
+    ),
+    "fig11": (
+        "density_by_method",
+        "densities by every method",
+        of_baseline("density") and of_methods("density", TABLE_CASE),
+    ),
+    "fig12": (
+        "exceedance_by_method",
+        "probabilities of exceedance by every method",
+        of_baseline("density") and of_methods("density", TABLE_CASE),
+    ),
+    "fig13": (
+        "density_by_gain",
+        "densities with each gain random alone, and with all",
+        of_last_method(GAIN_CASES, "density", "design"),
+    ),
+    "fig14": (
+        "limits_by_gain",
+        "limits with each gain random alone, and with all",
+        of_last_method(GAIN_CASES, "limits", "design"),
+    ),
+    "fig15": (
+        "density_by_variation",
+        "densities for gains that vary ever more",
+        of_last_method(VARIATION_CASES, "density", "design"),
+    ),
+    "fig16": (
+        "limits_by_variation",
+        "limits for gains that vary ever more",
+        of_last_method(VARIATION_CASES, "limits", "design"),
+    ),
+    "fig_sobol": (
+        "sobol",
+        "which gain matters for which response",
+        of_last_method([TABLE_CASE], "surrogate"),
+    ),
+    "fig_stability": (
+        "stability",
+        "which gains of the suspension hold the train",
+        of_baseline("baseline") and [place("stability"), *of_baseline("baseline")],
+    ),
+    "fig_accuracy": (
+        "accuracy",
+        "accuracy that a number of runs buys",
+        of_judged("accuracy"),
+    ),
+    "fig_scatter": (
+        "scatter",
+        "how the six responses go together",
+        of_baseline("baseline"),
+    ),
+    "fig_track_split": (
+        "track_split",
+        "what random gains and a random track contribute",
+        [place("track_split", case=case) for case in TRACK_CASES[:1]],
+    ),
+}
 
 
-rule fig_train_modes:
-    input:
-        "<results>/train/modes.nc",
-    output:
-        multiext("<results>/figures/fig_train_modes", ".png", ".pdf", ".nc"),
-    log:
-        "<logs>/fig_train_modes.log",
-    benchmark:
-        "<benchmarks>/fig_train_modes.tsv"
-    conda:
-        "../envs/maglev.yaml"
-    params:
-        out=subpath(output[0], strip_suffix=".png"),
-        code=code_of("figures", "figures.train_modes"),
-    message:
-        "Draw the train's modes by frequency and damping"
-    shell:
-        "maglev figure train_modes {input} --out {params.out} 2> {log}"
+for figure, (module, words, files) in DRAWN.items():
+    if not files:
+        continue
+
+    rule:
+        name:
+            figure
+        input:
+            files,
+        output:
+            multiext(f"<results>/figures/{figure}", ".png", ".pdf", ".nc"),
+        log:
+            f"<logs>/{figure}.log",
+        benchmark:
+            f"<benchmarks>/{figure}.tsv"
+        conda:
+            "../envs/maglev.yaml"
+        params:
+            out=subpath(output[0], strip_suffix=".png"),
+            code=code_of("figures", f"figures.{module}"),
+            module=module,
+        message:
+            f"Draw {words}"
+        shell:
+            "maglev figure {params.module} {input} --out {params.out} 2> {log}"

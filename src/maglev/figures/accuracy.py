@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from maglev.datasets import METHODS
 from maglev.figures import labels, style
+from maglev.vocabulary import METHODS
 
 AIM = 0.1
 """Error that counts as good, in standard deviations."""
@@ -34,8 +34,8 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         If the baseline carries no limit of a response.
     """
     levels = data["failure_probability"].to_numpy()
-    fig, axes = style.panels(2, 3, style.PAGE, 4.5)
-    for response, axis in enumerate(axes):
+    fig, panels = labels.response_panels(4.5)
+    for response, axis, _ in panels:
         at = data.isel(response=response)
         carried = np.flatnonzero(np.isfinite(at["reference_held_limit"].to_numpy()))
         if carried.size == 0:
@@ -65,10 +65,9 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
             axis.set_ylabel("error of the limit [σ]")
         if response >= 3:
             axis.set_xlabel("number of runs")
-        style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
         style.note(axis, f"at {levels[level]:g}: MCM ± {noise:.2g} σ")
     title = (
         "rarest limit that MCM carries, given that levitation holds; its noise: half its interval"
     )
-    style.below(fig, *axes[0].get_legend_handles_labels(), ncols=5, title=title, title_fontsize=7)
+    style.below(fig, *panels[0][1].get_legend_handles_labels(), columns=5, title=title)
     return fig, data

@@ -5,23 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 from matplotlib.axes import Axes
 
-from maglev.datasets import LIMIT_STATUS, RESPONSES, VARIABLES
+from maglev.arrays import FloatArray
+from maglev.datasets import VARIABLES
 from maglev.figures import labels
-
-FloatArray = npt.NDArray[np.float64]
+from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
 
 _ENDS = ("", "_low", "_high")
-_INFINITE = LIMIT_STATUS.index("infinite")
-_GIVEN = LIMIT_STATUS.index("given")
+_INFINITE = LIMIT_STATUS.index(INFINITE)
+_GIVEN = LIMIT_STATUS.index(GIVEN)
 
 
 def named(data: Sequence[xr.Dataset]) -> xr.DataArray:
     """The coordinate ``curve`` of files: their cases and methods."""
-    names = [f"{labels.case_of(one)}-{labels.method_of(one)}" for one in data]
+    names = [f"{labels.case_name(one)}-{labels.method_of(one)}" for one in data]
     flags = {"flag_values": np.arange(len(names), dtype="int32"), "flag_meanings": " ".join(names)}
     return xr.DataArray(np.arange(len(names), dtype="int32"), dims="curve", attrs=flags)
 

@@ -32,22 +32,17 @@ def figure(
     for one, design in zip(densities, designs, strict=True):
         name, look = labels.case_style(labels.gains_of(design))
         looks.append(look)
-        lost = labels.percent(float(one["lost_probability"]))
-        words.append(f"{name}, {int(one['n_runs'])} runs, lost {lost}")
-    fig, axes = style.panels(2, 3, style.PAGE, 4.7)
-    for response, axis in enumerate(axes):
+        words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
+    fig, panels = labels.response_panels(4.7)
+    for response, axis, shown in panels:
         curves.draw_densities(axis, found, response, looks)
         low, high = curves.body(found, response, 5e-3)
-        scale = labels.SHOWN[response].scale
-        axis.set_xlim(scale * low, scale * high)
-        style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
-    variation, n_spans = labels.settings(designs[0])
+        axis.set_xlim(shown.scale * low, shown.scale * high)
     style.below(
         fig,
-        axes[0].get_lines(),
+        panels[0][1].get_lines(),
         words,
-        ncols=3,
-        title=f"random ({n_spans} spans, coefficient of variation {variation:.2f})",
-        title_fontsize=7,
+        columns=3,
+        title=labels.of_settings(designs[0]),
     )
     return fig, found

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from maglev.datasets import RESPONSES
 from maglev.figures import curves, labels, style
+from maglev.vocabulary import RESPONSES
 
 _RESPONSE = RESPONSES.index("girder_displacement_z")
 

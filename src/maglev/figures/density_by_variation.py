@@ -40,27 +40,24 @@ def figure(
         for colour in colours
     ]
     words = [
-        f"{variation:.2f}, {int(n)} runs, lost {labels.percent(float(lost))}"
+        labels.of_runs(f"{variation:.2f}", n, lost)
         for variation, n, lost in zip(
             variations[order], found["curve_n_runs"], found["curve_lost_probability"], strict=True
         )
     ]
-    fig, axes = style.panels(2, 3, style.PAGE, 4.7)
-    for response, axis in enumerate(axes):
+    fig, panels = labels.response_panels(4.7)
+    for response, axis, shown in panels:
         curves.draw_densities(axis, found, response, looks)
         low, high = curves.body(found, response, 5e-3)
-        scale = labels.SHOWN[response].scale
-        axis.set_xlim(scale * low, scale * high)
-        style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
-        _say_strays(axis, found.isel(response=response), high, labels.SHOWN[response])
+        axis.set_xlim(shown.scale * low, shown.scale * high)
+        _say_strays(axis, found.isel(response=response), high, shown)
     n_spans = labels.settings(designs[0])[1]
     style.below(
         fig,
-        axes[0].get_lines(),
+        panels[0][1].get_lines(),
         words,
-        ncols=3,
+        columns=3,
         title=f"coefficient of variation of the gains ({n_spans} spans)",
-        title_fontsize=7,
     )
     return fig, found
 

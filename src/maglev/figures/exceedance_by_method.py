@@ -35,9 +35,9 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
     found = curves.densities(densities)
     truth = methods.index("mcm")
     n = int(found["curve_n_runs"][truth])
-    fig, axes = style.panels(2, 3, style.PAGE, 4.6)
-    for response, axis in enumerate(axes):
-        shown, at = labels.SHOWN[response], found.isel(response=response)
+    fig, panels = labels.response_panels(4.6)
+    for response, axis, shown in panels:
+        at = found.isel(response=response)
         for number, name in enumerate(methods):
             one = at.isel(curve=number)
             value = shown.scale * one["curve_value"]
@@ -53,12 +53,13 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
                     if response == 0
                     else None,
                 )
-            runs, lost = int(one["curve_n_runs"]), float(one["curve_lost_probability"])
             axis.plot(
                 value,
                 one["curve_exceedance"].where(one["curve_exceedance"] > 0),
                 **labels.METHOD_STYLE[name],
-                label=f"{labels.PDEM[name]}, {runs} runs, lost {labels.percent(lost)}",
+                label=labels.of_runs(
+                    labels.PDEM[name], one["curve_n_runs"], one["curve_lost_probability"]
+                ),
             )
         axis.set_yscale("log")
         axis.set_ylim(0.7 / n, 1.3)
@@ -72,6 +73,5 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         axis.set_xlabel(shown.axis)
         if response % 3 == 0:
             axis.set_ylabel("probability of exceedance [-]")
-        style.titled(axis, "abcdef"[response], shown.name)
-    style.below(fig, *axes[0].get_legend_handles_labels(), ncols=3)
+    style.below(fig, *panels[0][1].get_legend_handles_labels(), columns=3)
     return fig, found

@@ -5,8 +5,8 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.figure import Figure
 
-from maglev.datasets import RESPONSES
 from maglev.figures import style
+from maglev.vocabulary import RESPONSES
 
 _LABELS = {
     "girder_displacement_z": ("girder, vertical\ndisplacement [mm]", 1e3, "mm"),

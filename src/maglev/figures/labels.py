@@ -6,8 +6,11 @@ import json
 from dataclasses import dataclass
 
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from maglev.datasets import GAINS, METHODS, RESPONSES
+from maglev.figures import style
+from maglev.vocabulary import GAINS, METHODS, RESPONSES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,12 +57,12 @@ SHOWN = tuple(
         ("car-body acceleration, lat.", "acceleration", _ACCELERATION),
     )
 )
-"""How each response is shown, in the order of `maglev.datasets.RESPONSES`."""
+"""How each response is shown, in the order of `maglev.vocabulary.RESPONSES`."""
 
 assert len(SHOWN) == len(RESPONSES)
 
 GAIN = ("suspension $k_p$", "suspension $k_d$", "guidance $k_p$", "guidance $k_d$")
-"""The gains in short, in the order of `maglev.datasets.GAINS`."""
+"""The gains in short, in the order of `maglev.vocabulary.GAINS`."""
 
 GAIN_COLOUR = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00")
 """Their colours: suspension blue, guidance orange."""
@@ -96,8 +99,8 @@ def method_of(data: xr.Dataset) -> str:
     return str(name)
 
 
-def case_of(data: xr.Dataset) -> str:
-    """Name of the case that a file belongs to, in words."""
+def case_name(data: xr.Dataset) -> str:
+    """Name of the case that a file belongs to."""
     return str(data.attrs.get("case", ""))
 
 
@@ -144,6 +147,31 @@ def case_style(parameters: list[int]) -> tuple[str, dict[str, object]]:
     if len(parameters) == len(GAINS):
         return "all four gains", {"color": "#000000", "ls": "-"}
     return " and ".join(GAIN[number] for number in parameters), {"color": "#999999", "ls": "-"}
+
+
+def response_panels(height: float) -> tuple[Figure, list[tuple[int, Axes, Shown]]]:
+    """A page of six titled panels, one a response: its number, its panel, how it is shown.
+
+    Parameters
+    ----------
+    height
+        Of the figure [inch].
+    """
+    figure, axes = style.panels(2, 3, style.PAGE, height)
+    for letter, axis, shown in zip("abcdef", axes, SHOWN, strict=True):
+        style.titled(axis, letter, shown.name)
+    return figure, list(zip(range(len(SHOWN)), axes, SHOWN, strict=True))
+
+
+def of_runs(name: str, n_runs: float, lost_probability: float) -> str:
+    """Words of a legend for a curve: what it is, from how many runs, and how many are lost."""
+    return f"{name}, {int(n_runs)} runs, lost {percent(float(lost_probability))}"
+
+
+def of_settings(design: xr.Dataset) -> str:
+    """Words of a legend's title for which gains are random, and on which guideway."""
+    variation, n_spans = settings(design)
+    return f"random ({n_spans} spans, coefficient of variation {variation:.2f})"
 
 
 def percent(share: float) -> str:

@@ -33,16 +33,15 @@ def figure(
     found = curves.limits(limits)
     levels = found["failure_probability"].to_numpy()
     handles, words, looks = [], [], []
-    for number, (one, design) in enumerate(zip(limits, designs, strict=True)):
+    for one, design in zip(limits, designs, strict=True):
         parameters = labels.gains_of(design)
         name, look = labels.case_style(parameters)
         marker = _MARKERS[parameters[0]] if len(parameters) == 1 else "v"
         looks.append({**look, "marker": marker})
-        lost = labels.percent(float(one["lost_probability"]))
-        words.append(f"{name}, {int(found['curve_n_runs'][number])} runs, lost {lost}")
+        words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
         handles.append(Line2D([], [], **looks[-1], ms=3.5))
-    fig, axes = style.panels(2, 3, style.PAGE, 4.7)
-    for response, axis in enumerate(axes):
+    fig, panels = labels.response_panels(4.7)
+    for response, axis, shown in panels:
         at = curves.in_shown_unit(found, response)
         for number, look in enumerate(looks):
             apart = 1.06 ** (number - 0.5 * (len(looks) - 1))
@@ -51,14 +50,12 @@ def figure(
         axis.set_xlim(1.7 * levels.max(), levels.min() / 1.7)
         axis.set_xticks(levels, [f"{level:g}" for level in levels], minor=False)
         axis.minorticks_off()
-        axis.set_ylabel(f"limit, {labels.SHOWN[response].axis}")
+        axis.set_ylabel(f"limit, {shown.axis}")
         axis.set_xlabel("failure probability [-]")
-        style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
     if curves.differ(found):
         handles.append(Line2D([], [], ls="", marker="o", ms=3.5, mfc="white", color=style.QUIET))
         words.append("filled: of all passages; hollow, line: given that levitation holds")
-    variation, n_spans = labels.settings(designs[0])
     intervals = f"intervals: {labels.confidence(limits[0])}"
-    title = f"random ({n_spans} spans, coefficient of variation {variation:.2f}); {intervals}"
-    style.below(fig, handles, words, ncols=2, title=title, title_fontsize=7)
+    title = f"{labels.of_settings(designs[0])}; {intervals}"
+    style.below(fig, handles, words, columns=2, title=title)
     return fig, found

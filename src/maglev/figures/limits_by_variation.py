@@ -43,8 +43,8 @@ def figure(
     variation = variations[order]
     levels = found["failure_probability"].to_numpy()
     step = np.diff(variation).min() if variation.size > 1 else 0.02
-    fig, axes = style.panels(2, 3, style.PAGE, 4.7)
-    for response, axis in enumerate(axes):
+    fig, panels = labels.response_panels(4.7)
+    for response, axis, shown in panels:
         at = curves.in_shown_unit(found, response)
         for number in range(levels.size):
             look = _LOOKS[number % len(_LOOKS)]
@@ -54,8 +54,7 @@ def figure(
         axis.set_xlim(variation.min() - 0.6 * step, variation.max() + 0.6 * step)
         axis.set_xticks(variation, [f"{one:.2f}" for one in variation])
         axis.set_xlabel("coefficient of variation [-]")
-        axis.set_ylabel(f"limit, {labels.SHOWN[response].axis}")
-        style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
+        axis.set_ylabel(f"limit, {shown.axis}")
     handles = [
         Line2D([], [], **_LOOKS[k % len(_LOOKS)], ms=3.5)  # type: ignore[arg-type]
         for k in range(levels.size)
@@ -71,5 +70,5 @@ def figure(
     runs = found["curve_n_runs"].to_numpy()
     many = f"{runs.min()}" if runs.min() == runs.max() else f"{runs.min()} to {runs.max()}"
     title = f"{many} runs each; intervals: {labels.confidence(limits[0])}; levitation lost: {lost}"
-    style.below(fig, handles, words, ncols=4, title=title, title_fontsize=7)
+    style.below(fig, handles, words, columns=4, title=title)
     return fig, found

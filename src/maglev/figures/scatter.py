@@ -7,8 +7,8 @@ import xarray as xr
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from maglev.datasets import RESPONSES
 from maglev.figures import labels, style
+from maglev.vocabulary import RESPONSES
 
 _SHORT = (
     "midspan\ndispl. vert.",

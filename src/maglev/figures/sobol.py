@@ -26,8 +26,8 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     gains = labels.gains_of(data)
     place = np.arange(len(gains))[::-1]
     colours = [labels.GAIN_COLOUR[number] for number in gains]
-    fig, axes = style.panels(2, 3, style.PAGE, 3.9)
-    for response, axis in enumerate(axes):
+    fig, panels = labels.response_panels(3.9)
+    for response, axis, _ in panels:
         at = data.isel(response=response)
         for name, shift, filled in (("sobol_first", 0.2, True), ("sobol_total", -0.2, False)):
             middle = at[name].to_numpy()
@@ -46,7 +46,6 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         axis.grid(visible=False, axis="y")
         axis.set_xlim(0, 1.05)
         error = float(at["leave_one_out_error"])
-        style.titled(axis, "abcdef"[response], labels.SHOWN[response].name)
         axis.annotate(
             f"surrogate's error {error:.2f} σ",
             (0.98, 0.03),
@@ -68,9 +67,8 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         fig,
         handles,
         words,
-        ncols=2,
+        columns=2,
         title=f"bars: {confidence} intervals of the sampling, without the surrogate's error",
-        title_fontsize=7,
     )
     shown = [name for name in data.data_vars if str(name).startswith("sobol")]
     return fig, data[[*shown, "leave_one_out_error"]]

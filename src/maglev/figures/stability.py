@@ -7,8 +7,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from maglev.datasets import STATUS
 from maglev.figures import labels, style
+from maglev.vocabulary import STATUS
 
 _LOST = "#D55E00"
 _COLOURS, _LINES = (_LOST, "#CC79A7"), ("-", ":")  # without lag, with lag
@@ -98,7 +98,7 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
         *(f"border with {1e3 * lag:g} ms of lag" for lag in lags[1:]),
         "mean gains",
     ]
-    style.below(fig, handles, words, ncols=3)
+    style.below(fig, handles, words, columns=3)
     gains = runs[["suspension_proportional_gain", "suspension_derivative_gain", "status"]]
     return fig, xr.merge([stability, gains])
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 from matplotlib.artist import Artist
@@ -111,9 +110,12 @@ def table(
     axis.plot([0.0, 1.0], [y, y], color="#000000", lw=0.5, transform=axis.transAxes)
 
 
-def below(figure: Figure, handles: Sequence[Artist], words: Sequence[str], **options: Any) -> None:
-    """Put a legend under all panels, off the data."""
-    figure.legend(handles, words, loc="outside lower center", **options)
+def below(
+    figure: Figure, handles: Sequence[Artist], words: Sequence[str], columns: int, title: str = ""
+) -> None:
+    """Put a legend in some columns under all panels, off the data."""
+    where = "outside lower center"
+    figure.legend(handles, words, loc=where, ncols=columns, title=title or None, title_fontsize=7)
 
 
 def mark_demonstration(figure: Figure) -> None:

@@ -27,9 +27,9 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     figure, plotted
         The figure and the numbers in it.
     """
-    fig, axes = style.panels(2, 3, style.PAGE, 4.9)
-    for response, axis in enumerate(axes):
-        at, shown = data.isel(response=response), labels.SHOWN[response]
+    fig, panels = labels.response_panels(4.9)
+    for response, axis, shown in panels:
+        at = data.isel(response=response)
         curves = {name: at[name].to_numpy() / shown.scale for name in _PARTS}
         peaks = {name: one.max() for name, one in curves.items()}
         top = max(peak for peak in peaks.values() if peak <= 6 * min(peaks.values()))
@@ -51,11 +51,10 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         lines += [f"peak of {_PARTS[name][0]}: {peaks[name]:.3g}" for name in gone]
         style.note(axis, "\n".join(lines))
         axis.set(xlabel=shown.axis, ylabel=shown.density_axis)
-        style.titled(axis, "abcdef"[response], shown.name)
     confidence = labels.confidence(data)
     title = (
         f"in the panels: shares of the variance with {confidence} intervals; "
         f"{int(data['n_runs'])} runs in all"
     )
-    style.below(fig, *axes[0].get_legend_handles_labels(), ncols=3, title=title, title_fontsize=7)
+    style.below(fig, *panels[0][1].get_legend_handles_labels(), columns=3, title=title)
     return fig, data

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from maglev.datasets import TRAIN_PARTS
 from maglev.figures import style
+from maglev.vocabulary import TRAIN_PARTS
 
 _LOOK = {  # colour and marker of what moves
     "car_body": (style.MODEL, "o"),

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from maglev.datasets import METHODS, RESPONSES
 from maglev.figures import curves, labels, style
+from maglev.vocabulary import METHODS, RESPONSES
 
 _SHOWN = ("girder_displacement_z", "girder_acceleration_z")
 
@@ -87,7 +87,7 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
         for axis, letter in ((upper, "ab"[column]), (lower, "cd"[column])):
             axis.set_xlim(0, 1.03 * max(one[0].max() for one in rows))
             style.titled(axis, letter, shown.name)
-    style.below(fig, *axes[0].get_legend_handles_labels(), ncols=len(designs))
+    style.below(fig, *axes[0].get_legend_handles_labels(), columns=len(designs))
     return fig, plotted
 
 

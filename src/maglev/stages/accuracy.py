@@ -8,12 +8,14 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import METHODS, RESPONSES
 from maglev.parameters import Config
+from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, extremes, lost, method_number
 from maglev.stages.limits import baseline_limits
+from maglev.stages.reads import PREDICTING, SURROGATE_OF_METHODS
 from maglev.stages.surrogate import predictor
 from maglev.uncertainty.reliability import sample_limits
+from maglev.vocabulary import METHODS, RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -56,7 +58,7 @@ def steps(designs: Mapping[str, xr.Dataset]) -> dict[str, list[int]]:
     return found
 
 
-def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Judge every method by the baseline, for growing numbers of its runs.
 
     Surrogates are evaluated at the baseline's own points, so that its sampling noise, which both
@@ -69,7 +71,7 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
         The configuration.
     baseline
         Layout ``runs``.
-    designs
+    design
         Layout ``design``, by method.
 
     Returns
@@ -97,26 +99,26 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
         for of in (reference, held_reference)
     )
 
-    sizes = steps(designs)
+    sizes = steps(design)
     n_steps = max(len(one) for one in sizes.values())
-    shape = (len(designs), n_steps, len(RESPONSES))
+    shape = (len(design), n_steps, len(RESPONSES))
     n_runs = np.zeros(shape[:2], dtype=int)
     rmse, error = np.full(shape, np.nan), np.full(shape, np.nan)
     share = np.full(shape[:2], np.nan)
     limit, held_limit = (np.full((*shape, len(levels)), np.nan) for _ in range(2))
-    names = sorted(designs, key=METHODS.index)
+    names = sorted(design, key=METHODS.index)
     for row, name in enumerate(names):
         choice = getattr(config.study, name).surrogate
         for step, n in enumerate(sizes[name]):
             n_runs[row, step] = n
-            part = designs[name].isel(sample=slice(0, n))
+            part = design[name].isel(sample=slice(0, n))
             if np.count_nonzero(~lost(part)) < part.sizes["parameter"] + 3:
                 continue  # no linear tail with one sample left out
             found = predictor(config, part, choice)
             predicted, held = found.surrogate.predict(points), found.held(points)
             rmse[row, step] = np.sqrt(np.mean((predicted - truth)[~away] ** 2, axis=0))
             share[row, step] = 1.0 - held.mean()
-            following = designs[name].isel(sample=slice(n, n + config.study.asm.batch_size))
+            following = design[name].isel(sample=slice(n, n + config.study.asm.batch_size))
             complete = following.sizes["sample"] == config.study.asm.batch_size
             following = following.isel(sample=~lost(following))
             if complete and following.sizes["sample"]:
@@ -159,3 +161,18 @@ def dataset(config: Config, baseline: xr.Dataset, designs: Mapping[str, xr.Datas
             failure_probability=list(levels),
         ),
     )
+
+
+STAGE = Stage(
+    name="accuracy",
+    of="case",
+    reads=(
+        *PREDICTING,
+        *SURROGATE_OF_METHODS,
+        "study.failure_probability",
+        "study.asm.batch_size",
+    ),
+    inputs={"baseline": Input("runs"), "design": Input("design", by=("method",))},
+    layout="accuracy",
+    compute=dataset,
+)

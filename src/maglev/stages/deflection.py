@@ -8,7 +8,8 @@ from maglev.mechanics import train
 from maglev.mechanics.course import start
 from maglev.mechanics.moving_load import midspan_deflection
 from maglev.parameters import Config
-from maglev.stages.modes import euler_span
+from maglev.stage import Input, Stage
+from maglev.stages.guideway_modes import euler_span
 
 
 def load_per_length(config: Config) -> float:
@@ -53,3 +54,13 @@ def dataset(config: Config, passage: xr.Dataset) -> xr.Dataset:
         },
         coords={"t": time.to_numpy()},
     )
+
+
+STAGE = Stage(
+    name="deflection",
+    of="run",
+    reads=("train", "guideway", "passage"),
+    inputs={"passage": Input("passage")},
+    layout="deflection",
+    compute=dataset,
+)

@@ -6,15 +6,22 @@ import logging
 
 import numpy as np
 import xarray as xr
-from scipy import stats
 
-from maglev.datasets import DENSITY_METHODS, RESPONSES
+from maglev.arrays import FloatArray
 from maglev.parameters import Config
-from maglev.stages.extremes import FloatArray, coordinates, extremes, lost
+from maglev.stage import Input, Stage
+from maglev.stages.extremes import coordinates, extremes, lost
+from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import loss_comment, stored_predictor
-from maglev.uncertainty.gdee import density_with_strays, direct_density, silverman_bandwidth
-from maglev.uncertainty.reliability import error_range_near, exceedance
+from maglev.uncertainty.gdee import (
+    density_with_strays,
+    direct_density,
+    direct_density_band,
+    silverman_bandwidth,
+)
+from maglev.uncertainty.reliability import binomial_interval, error_range_near, exceedance
 from maglev.uncertainty.samples import held_part
+from maglev.vocabulary import BASELINE, DENSITY_METHODS, DESIGNED, RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -26,6 +33,34 @@ REACH = 4.0
 normal kernel has fallen to 3e-4 of its peak there."""
 
 COMMENT = "density of the held part: it integrates to one less lost_probability"
+
+
+def dataset(
+    config: Config,
+    baseline: xr.Dataset | None = None,
+    design: xr.Dataset | None = None,
+    surrogate: xr.Dataset | None = None,
+    eev: xr.Dataset | None = None,
+) -> xr.Dataset:
+    """Density and exceedance of a baseline, or of what a surrogate predicts.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    baseline
+        Layout ``runs``; in its place the three others, as `of_surrogate` takes them.
+
+    Returns
+    -------
+    dataset
+        Layout ``density``.
+    """
+    if baseline is not None:
+        return of_baseline(config, baseline)
+    if design is None or surrogate is None or eev is None:
+        raise ValueError("density: needs a baseline, or a design with its surrogate and eev")
+    return of_surrogate(config, design, surrogate, eev)
 
 
 def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
@@ -56,13 +91,21 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
         column = _column(held.values, held.probability, held.lost_probability)
         n_beyond = np.round(column["exceedance"] * n)
         low, high = binomial_interval(n_beyond, n, config.study.confidence)
-        band = density_band(column, held.values, held.lost_probability, n, config.study.confidence)
+        band = direct_density_band(
+            column["value"],
+            held.values,
+            n,
+            density=column["density_direct"],
+            bandwidth=column["bandwidth"],
+            lost_probability=held.lost_probability,
+            confidence=config.study.confidence,
+        )
         columns.append(
             column
             | {"exceedance_low": low, "exceedance_high": high}
             | {"density_direct_low": band[0], "density_direct_high": band[1]}
         )
-    result = _dataset(columns, float(away.mean()), n)
+    result = _put_together(columns, float(away.mean()), n)
     result["exceedance"].attrs["comment"] = "interval: exact binomial, at each value by itself"
     return result
 
@@ -145,83 +188,13 @@ def of_surrogate(
                 )[::-1],
             }
         )
-    result = _dataset(columns, loss.probability, design.sizes["sample"])
+    result = _put_together(columns, loss.probability, design.sizes["sample"])
     result["lost_probability"].attrs["comment"] = loss_comment(loss)
     result["exceedance"].attrs["comment"] = (
         "exact weighted distribution of the representative points; interval: leave-one-out "
         "residuals of the training samples near each value"
     )
     return result
-
-
-def binomial_interval(
-    n_beyond: FloatArray | float, n: int, confidence: float
-) -> tuple[FloatArray, FloatArray]:
-    """Exact interval of a probability of which ``n_beyond`` of ``n`` samples speak.
-
-    Parameters
-    ----------
-    n_beyond : (...)
-        Numbers of samples.
-    n
-        Number of all.
-    confidence
-        Two-sided confidence [-].
-
-    Returns
-    -------
-    low, high : (...)
-        Ends of the interval [-].
-
-    References
-    ----------
-    Clopper, Pearson, Biometrika 26 (1934) 404-413.
-    """
-    k = np.asarray(n_beyond, dtype=float)
-    outside = 0.5 * (1.0 - confidence)
-    low = np.where(k > 0, stats.beta.ppf(outside, np.maximum(k, 1), n - k + 1), 0.0)
-    high = np.where(k < n, stats.beta.ppf(1.0 - outside, k + 1, np.maximum(n - k, 1)), 1.0)
-    return low, high
-
-
-def density_band(
-    column: dict, values: FloatArray, lost_probability: float, n: int, confidence: float
-) -> tuple[FloatArray, FloatArray]:
-    """Band of the sampling noise of a direct density of independent runs, place by place.
-
-    The density is a mean over all runs of the kernel φ_h, its variance that of the kernel over n;
-    the mean of φ_h² is the direct density with the bandwidth h/√2, over 2√π h.  The kernel's bias
-    is not in it.
-
-    Parameters
-    ----------
-    column
-        ``value``, ``density_direct`` and ``bandwidth`` h of the density.
-    values : (sample,)
-        Extremes that held [their unit].
-    lost_probability
-        Share of runs that did not [-].
-    n
-        Number of all runs.
-    confidence
-        Two-sided confidence [-].
-
-    Returns
-    -------
-    low, high : (place,)
-        Ends of the band [1/unit]; the lower one is at least 0.
-
-    References
-    ----------
-    Silverman, Density Estimation (1986), sec. 3.3.
-    """
-    h, density = column["bandwidth"], column["density_direct"]
-    narrower = direct_density(
-        column["value"], values, bandwidth=h / np.sqrt(2.0), lost_probability=lost_probability
-    )
-    variance = np.maximum(narrower / (2.0 * np.sqrt(np.pi) * h) - density**2, 0.0) / n
-    half = stats.norm.ppf(0.5 + 0.5 * confidence) * np.sqrt(variance)
-    return np.maximum(density - half, 0.0), density + half
 
 
 def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> FloatArray:
@@ -265,7 +238,7 @@ def _column(values: FloatArray, probability: FloatArray, lost_probability: float
     }
 
 
-def _dataset(columns: list[dict], lost_probability: float, n_runs: int) -> xr.Dataset:
+def _put_together(columns: list[dict], lost_probability: float, n_runs: int) -> xr.Dataset:
     """The file's dataset from what it holds of each response."""
     variables = {}
     for name in columns[0]:
@@ -279,3 +252,18 @@ def _dataset(columns: list[dict], lost_probability: float, n_runs: int) -> xr.Da
     for name in ("density", "density_direct"):
         result[name].attrs["comment"] = COMMENT
     return result
+
+
+STAGE = Stage(
+    name="density",
+    of="method",
+    reads=PREDICTING,
+    inputs={
+        "baseline": Input("runs", methods=(BASELINE,)),
+        "design": Input("design", methods=DESIGNED),
+        "surrogate": Input("surrogate", methods=DESIGNED),
+        "eev": Input("eev", methods=DESIGNED),
+    },
+    layout="density",
+    compute=dataset,
+)

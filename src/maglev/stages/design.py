@@ -17,44 +17,46 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from maglev import datasets
-from maglev.datasets import DECISIONS, RESPONSES
+from maglev.arrays import FloatArray, IntArray
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
-from maglev.stages.points import case_of, generator, marginals
+from maglev.stage import Input, Stage
+from maglev.stages.extremes import extremes, lost
+from maglev.stages.points import case_of, marginals
+from maglev.stages.randomness import generator
+from maglev.stages.reads import RUNS_OF_CASE
 from maglev.stages.runs import content, key_of, runs
-from maglev.uncertainty.adaptive import AdaptiveState, absorb, propose, stop_reason
+from maglev.uncertainty.adaptive import AdaptiveState, absorb, decision, propose
 from maglev.uncertainty.failure_region import border_batch, fit_failure_region
 from maglev.uncertainty.kriging import fit_kriging
 from maglev.uncertainty.learning import predicted_limits, tail_batch, taylor_batch
 from maglev.uncertainty.pointset import sobol_points
 from maglev.uncertainty.selection import fit_selected
-from maglev.uncertainty.surrogate import Array, Fit, Surrogate
+from maglev.uncertainty.surrogate import Fit, Surrogate
+from maglev.vocabulary import ADAPTIVE, DECISIONS, DESIGNED, RESPONSES
 
 _LOG = logging.getLogger(__name__)
-
-ADAPTIVE = ("asm_paper", "asm")
-"""The methods that go in rounds."""
 
 N_LIMITS = 2**14
 """Sobol' points on which the limits of successive rounds are compared; assumed: 16 of them lie
 beyond the limit at 1e-3, and their noise is the same in all rounds."""
 
-_GO_ON, _SMALL_ERROR, _SETTLED, _LARGEST = range(len(DECISIONS))
+_GO_ON, _, _SETTLED, _LARGEST = range(len(DECISIONS))
 
 
 def dataset(
     config: Config,
     case: str,
     method: str,
-    points: Mapping[str, xr.Dataset],
-    store: str | Path,
-    *,
+    initial_points: xr.Dataset,
+    candidate_points: xr.Dataset | None = None,
     baseline: xr.Dataset | None = None,
+    *,
+    store: str | Path,
     n_threads: int = 1,
 ) -> xr.Dataset:
     """Make a design, or go on with one that was stopped.
@@ -67,13 +69,14 @@ def dataset(
         Name of the case.
     method
         ``"osm"``, ``"asm_paper"`` or ``"asm"``.
-    points
-        Layout ``points``: the first design as ``"initial"`` and, for an adaptive method,
-        ``"candidates"``.
-    store
-        Folder of the store of runs and rounds.
+    initial_points
+        Layout ``points``: the first design.
+    candidate_points
+        Layout ``points``: what the rounds of an adaptive method choose from.
     baseline
         Layout ``runs``: what the surrogate of each round is compared with.
+    store
+        Folder of the store of runs and rounds.
     n_threads
         Rows of samples computed at the same time; the numbers do not depend on it.
 
@@ -92,6 +95,9 @@ def dataset(
     ----------
     docs/theory/adaptive_sampling.md.
     """
+    points = {"initial": initial_points}
+    if candidate_points is not None:
+        points["candidates"] = candidate_points
     with threadpool_limits(1, "blas"):  # more threads would sum in another order
         return _Design(config, case, method, points, store, baseline, n_threads).finished()
 
@@ -200,11 +206,11 @@ class _Design:
         path: Path,
         state: AdaptiveState,
         surrogate: Surrogate | None,
-        limits_before: Array | None,
+        limits_before: FloatArray | None,
         changes: list[float],
     ) -> Surrogate:
         """Choose, run and judge the points of one round, and write it; the surrogate after it."""
-        predicted: Array | None = None
+        predicted: FloatArray | None = None
         if surrogate is None:
             initial = self.points["initial"]
             standard, probability = initial["standard"].values, initial["probability"].values
@@ -259,12 +265,12 @@ class _Design:
         self,
         number: int,
         state: AdaptiveState,
-        scores: Array,
+        scores: FloatArray,
         surrogate: Surrogate,
-        occupied: Array,
-        candidates: Array,
+        occupied: FloatArray,
+        candidates: FloatArray,
         n_new: int,
-    ) -> npt.NDArray[np.int64]:
+    ) -> IntArray:
         """Candidates of the next round; ``scores`` receives why."""
         region = None
         if state.lost.any():
@@ -298,7 +304,7 @@ class _Design:
         """Number of the response that drives the published method."""
         return RESPONSES.index(self.settings.response)
 
-    def _limits(self, number: int, state: AdaptiveState, surrogate: Surrogate) -> Array:
+    def _limits(self, number: int, state: AdaptiveState, surrogate: Surrogate) -> FloatArray:
         """Limits (response, level) by a surrogate, on points that are the same in all rounds."""
         held = None
         if state.lost.any():
@@ -307,7 +313,7 @@ class _Design:
             held = 1.0 - region.lost_probability(self.population)
         return predicted_limits(surrogate.predict(self.population), self.levels, held).T
 
-    def _rmse(self, surrogate: Surrogate) -> Array:
+    def _rmse(self, surrogate: Surrogate) -> FloatArray:
         """Root mean square error (1, response) against the baseline; NaN without one."""
         if self.truth is None:
             return np.full((1, len(RESPONSES)), np.nan)
@@ -315,20 +321,20 @@ class _Design:
         return np.sqrt(np.mean((surrogate.predict(standard) - values) ** 2, axis=0))[None]
 
     def _decision(self, state: AdaptiveState, changes: list[float]) -> int:
-        """Whether to go on, from the history alone: a number of `maglev.datasets.DECISIONS`."""
+        """Whether to go on, from the history alone: a number of `maglev.vocabulary.DECISIONS`."""
         if self.method == "osm":
             return _LARGEST
         settings = self.settings
         largest = max(settings.n_largest - settings.batch_size + 1, 1)  # whole rounds only
         if self.method == "asm_paper":
             driving = replace(state, error=state.error[:, [self._driving]])
-            reason = stop_reason(
+            decided = decision(
                 driving,
                 threshold=settings.threshold,
                 n_rounds=settings.n_rounds,
                 n_largest=largest,
             )
-            return {None: _GO_ON, "error below threshold": _SMALL_ERROR}.get(reason, _LARGEST)
+            return DECISIONS.index(decided)
         # the change of the first design is NaN, which is not small
         if (np.array(changes[-settings.n_rounds :]) <= settings.threshold).all():
             return _SETTLED
@@ -356,26 +362,21 @@ class _Design:
         return whole
 
 
-def _extremes(dataset: xr.Dataset) -> Array:
-    """Extremes (sample, response) of runs."""
-    return np.stack([dataset[name].values for name in RESPONSES], axis=1)
-
-
 def _absorbed(state: AdaptiveState, one: xr.Dataset) -> AdaptiveState:
     """The state with one round more."""
-    lost = one["status"].values != 0
+    away = lost(one)
     predicted = one["predicted"].values if state.tested.size else None
-    values = np.where(lost[:, None], np.nan, _extremes(one))
-    return absorb(state, one["standard"].values, values, lost, predicted)
+    values = np.where(away[:, None], np.nan, extremes(one))
+    return absorb(state, one["standard"].values, values, away, predicted)
 
 
-def _held(baseline: xr.Dataset) -> tuple[Array, Array]:
+def _held(baseline: xr.Dataset) -> tuple[FloatArray, FloatArray]:
     """Points (sample, parameter) and extremes (sample, response) of a baseline that held."""
-    held = baseline["status"].values == 0
-    return baseline["standard"].values[held], _extremes(baseline)[held]
+    held = ~lost(baseline)
+    return baseline["standard"].values[held], extremes(baseline)[held]
 
 
-def _hash(*arrays: Array) -> str:
+def _hash(*arrays: FloatArray) -> str:
     """First 16 hexadecimal digits of a hash over the bytes of arrays."""
     digest = hashlib.sha256()
     for array in arrays:
@@ -383,8 +384,24 @@ def _hash(*arrays: Array) -> str:
     return digest.hexdigest()[:16]
 
 
-def _largest_change(before: Array, after: Array, scale: Array) -> float:
+def _largest_change(before: FloatArray, after: FloatArray, scale: FloatArray) -> float:
     """Largest change of a limit (response, level) over the deviations (response,) [-]."""
     both = np.isinf(before) & np.isinf(after)
     change = np.abs(np.where(both, 0.0, after) - np.where(both, 0.0, before))
     return float(np.max(change / scale[:, None]))
+
+
+STAGE = Stage(
+    name="design",
+    of="method",
+    reads=(*RUNS_OF_CASE, "study.failure_probability", "study.{method}"),
+    inputs={
+        "initial_points": Input("points"),
+        "candidate_points": Input("points", methods=ADAPTIVE),
+        "baseline": Input("runs", optional=True),
+    },
+    takes={"case": str, "method": str, "store": Path, "n_threads": int},
+    methods=DESIGNED,
+    layout="design",
+    compute=dataset,
+)

@@ -1,42 +1,36 @@
 """Dynamic coefficient of the midspan deflection over a range of speeds.
 
-Every passage is kept as a small file of its own as soon as it is computed, under a name made from
-all that decides its content.  A sweep that was stopped goes on where it was.
+Every passage is kept in the store of runs as soon as it is computed: a sweep that was stopped goes
+on where it was.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import logging
 import math
-import threading
-import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from maglev import datasets
-from maglev.fingerprint import code_of
+from maglev.arrays import FloatArray
 from maglev.measurements import load_measurements
 from maglev.mechanics import guideway, train
 from maglev.mechanics.moving_load import dynamic_factor
 from maglev.mechanics.statics import largest_deflection
 from maglev.parameters import Config
-from maglev.simulation import simulate
-from maglev.stages import config_slice
+from maglev.stage import Stage
 from maglev.stages.deflection import load_per_length
-from maglev.stages.modes import euler_span
+from maglev.stages.guideway_modes import euler_span
+from maglev.stages.reads import TRAIN_ON_GUIDEWAY
+from maglev.stages.runs import stored_runs
+from maglev.vocabulary import STATUS
 
 _LOG = logging.getLogger(__name__)
 
-_FILES = threading.Lock()
-"""Held while a file is open: the NetCDF library serves one thread at a time."""
 
-
-def speeds(config: Config) -> np.ndarray:
+def speeds(config: Config) -> FloatArray:
     """Speeds of the sweep (speed,) [m/s], both ends included where the step divides the range."""
     sweep = config.validation
     n_steps = math.floor((sweep.speed_max - sweep.speed_min) / sweep.speed_step + 1e-9)
@@ -48,44 +42,15 @@ def _at_speed(config: Config, speed: float) -> Config:
     return config.model_copy(update={"passage": passage})
 
 
-def _passage(config: Config, store: Path, code: str) -> tuple[xr.Dataset, bool]:
-    """Extremes of one passage at the mean gains; whether they were computed, not found kept."""
-    content = config_slice(config.quantities(), "passage")
-    key = json.dumps([content, code], sort_keys=True).encode()
-    path = store / f"{hashlib.sha256(key).hexdigest()[:16]}.nc"
-    is_new = not path.is_file()
-    if is_new:
-        computed = simulate(config, np.array([config.gains.as_row]))
-        with _FILES:
-            datasets.write(computed, path, "passage", config=content, code=code)
-    with _FILES:
-        return datasets.read(path, "passage"), is_new
-
-
-def _passages(config: Config, sweep: np.ndarray, store: Path, n_threads: int) -> list[xr.Dataset]:
-    """Extremes of one passage at each speed; says how far it is after each.
-
-    The time left assumes that a passage takes as long as the train needs, in proportion 1 / speed.
-    """
-    code = code_of("simulation")
-    began, work_done, n_new = time.perf_counter(), 0.0, 0
+def _passages(config: Config, sweep: FloatArray, store: Path, n_threads: int) -> list[xr.Dataset]:
+    """Extremes of one passage at each speed, from the store or computed now."""
+    gains = np.array([config.gains.as_row])
     passages = []
     with ThreadPoolExecutor(n_threads) as pool:
-        found = pool.map(lambda speed: _passage(_at_speed(config, speed), store, code), sweep)
-        for k, (one, is_new) in enumerate(found):
+        found = pool.map(lambda speed: stored_runs(_at_speed(config, speed), gains, store), sweep)
+        for k, one in enumerate(found, start=1):
             passages.append(one)
-            if is_new:
-                n_new, work_done = n_new + 1, work_done + 1 / sweep[k]
-            seconds = time.perf_counter() - began
-            left = seconds * np.sum(1 / sweep[k + 1 :]) / work_done if n_new else 0.0
-            _LOG.info(
-                "%d of %d speeds done (%d of them found), %.2f s each, %.0f s left",
-                k + 1,
-                sweep.size,
-                k + 1 - n_new,
-                seconds / max(n_new, 1),
-                left,
-            )
+            _LOG.info("%d of %d speeds done", k, sweep.size)
     return passages
 
 
@@ -97,7 +62,7 @@ def dataset(config: Config, store: str | Path, n_threads: int = 1) -> xr.Dataset
     config
         The configuration; its ``passage.speed`` plays no part.
     store
-        Folder in which the passages are kept.
+        Folder of the store of runs.
     n_threads
         Passages computed at the same time; the numbers do not depend on it.
 
@@ -127,7 +92,7 @@ def dataset(config: Config, store: str | Path, n_threads: int = 1) -> xr.Dataset
             lost.size,
             sweep.size,
             3.6 * sweep[lost[0]],
-            datasets.STATUS[int(status[lost[0]])],
+            STATUS[int(status[lost[0]])],
         )
     factors = [dynamic_factor(beam, config.train.length, float(speed)) for speed in sweep]
     result = xr.Dataset(
@@ -147,3 +112,13 @@ def dataset(config: Config, store: str | Path, n_threads: int = 1) -> xr.Dataset
         "confidence": ", ".join(one.confidence for one in measured),
     }
     return result
+
+
+STAGE = Stage(
+    name="dynamic_factor",
+    of="run",
+    reads=(*TRAIN_ON_GUIDEWAY, "gains", "validation"),
+    takes={"store": Path, "n_threads": int},
+    layout="dynamic_factor",
+    compute=dataset,
+)

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import xarray as xr
 
-from maglev.datasets import GAINS
 from maglev.parameters import Config
+from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates
+from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import stored_predictor
+from maglev.vocabulary import DESIGNED, GAINS
 
 
 def dataset(
-    config: Config, design: xr.Dataset, surrogate: xr.Dataset, points: xr.Dataset
+    config: Config,
+    design: xr.Dataset,
+    surrogate: xr.Dataset,
+    representative_points: xr.Dataset,
 ) -> xr.Dataset:
     """Predict the six extremes at the representative points.
 
@@ -23,8 +28,8 @@ def dataset(
         Layout ``design``.
     surrogate
         Layout ``surrogate``, of this design.
-    points
-        Layout ``points``: the representative ones.
+    representative_points
+        Layout ``points``.
 
     Returns
     -------
@@ -33,6 +38,7 @@ def dataset(
         they mean nothing, see ``lost_probability_at``.
     """
     found = stored_predictor(config, design, surrogate)
+    points = representative_points
     at = points["standard"].to_numpy()
     of_response = ("sample", "response")
     return xr.Dataset(
@@ -44,3 +50,18 @@ def dataset(
         },
         coords=coordinates(sample=points["sample"], parameter=points["parameter"]),
     )
+
+
+STAGE = Stage(
+    name="eev",
+    of="method",
+    reads=PREDICTING,
+    inputs={
+        "design": Input("design"),
+        "surrogate": Input("surrogate"),
+        "representative_points": Input("points"),
+    },
+    methods=DESIGNED,
+    layout="eev",
+    compute=dataset,
+)

@@ -1,22 +1,20 @@
-"""The extremes of a set of runs as arrays, and the random numbers of the statistical stages."""
+"""The extremes of a set of runs as arrays, and the coordinates of what is made of them."""
 
 from __future__ import annotations
-
-import zlib
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 from scipy.stats import norm
 
-from maglev.datasets import GAINS, METHODS, RESPONSES
+from maglev.arrays import BoolArray, FloatArray
+from maglev.stages.randomness import generator_of_statistics
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import sobol_points
+from maglev.vocabulary import METHODS, RESPONSES
 
-FloatArray = npt.NDArray[np.float64]
 
-
-def lost(runs: xr.Dataset) -> npt.NDArray[np.bool_]:
+def lost(runs: xr.Dataset) -> BoolArray:
     """Which samples of a set of runs (sample,) have lost levitation."""
     return runs["status"].to_numpy() != 0
 
@@ -24,19 +22,6 @@ def lost(runs: xr.Dataset) -> npt.NDArray[np.bool_]:
 def extremes(runs: xr.Dataset) -> FloatArray:
     """Extremes (sample, response) of a set of runs [m, m s-2], NaN where levitation was lost."""
     return np.column_stack([runs[name].to_numpy() for name in RESPONSES])
-
-
-def generator(seed: int, purpose: str) -> np.random.Generator:
-    """A source of random numbers of its own for each purpose.
-
-    Parameters
-    ----------
-    seed
-        Seed of the configuration.
-    purpose
-        What the numbers are for; the same words give the same numbers.
-    """
-    return np.random.default_rng([seed, zlib.crc32(purpose.encode())])
 
 
 def population(seed: int, n: int, n_parameters: int) -> FloatArray:
@@ -54,7 +39,7 @@ def population(seed: int, n: int, n_parameters: int) -> FloatArray:
         Number of random gains.
     """
     marginals = Marginals([norm()] * n_parameters)
-    return sobol_points(marginals, n, generator(seed, "population")).standard
+    return sobol_points(marginals, n, generator_of_statistics(seed, "population")).standard
 
 
 def coordinates(**along: npt.ArrayLike) -> dict[str, npt.ArrayLike]:
@@ -65,8 +50,3 @@ def coordinates(**along: npt.ArrayLike) -> dict[str, npt.ArrayLike]:
 def method_number(name: str) -> np.int8:
     """The code of a method in a file."""
     return np.int8(METHODS.index(name))
-
-
-def parameter_names(runs: xr.Dataset) -> list[str]:
-    """Names of the random gains of a set of runs, in the order of its ``parameter``."""
-    return [GAINS[number] for number in runs["parameter"].to_numpy()]

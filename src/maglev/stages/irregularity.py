@@ -16,6 +16,7 @@ from maglev.mechanics.irregularity import (
     spectral_density,
 )
 from maglev.parameters import Config, Irregularity
+from maglev.stage import Stage
 
 _POINTS_PER_WAVELENGTH = 10  # of the shortest wavelength, in the file
 _SPECTRUM_LENGTH = 10  # length behind the spectra, in longest wavelengths: harmonics recur in 10
@@ -89,3 +90,12 @@ def dataset(config: Config) -> xr.Dataset:
         }
     coordinates = {"side": np.array([-1, 1]), "x": x, "wavenumber": wavenumber}
     return xr.Dataset(variables, coords=coordinates)
+
+
+STAGE = Stage(
+    name="irregularity",
+    of="run",
+    reads=("seed", "train", "guideway", "irregularity", "passage"),
+    layout="irregularity",
+    compute=dataset,
+)

@@ -9,24 +9,49 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import LIMIT_STATUS, RESPONSES
+from maglev.arrays import FloatArray
 from maglev.parameters import Config
-from maglev.stages.density import binomial_interval
-from maglev.stages.extremes import FloatArray, coordinates, extremes, lost, population
+from maglev.stage import Input, Stage
+from maglev.stages.extremes import coordinates, extremes, lost, population
+from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import loss_comment, stored_predictor
 from maglev.uncertainty.reliability import (
-    BEYOND_SAMPLE,
-    GIVEN,
-    LOST,
     Limits,
+    binomial_interval,
     error_range_near,
     sample_limits,
     surrogate_limits,
 )
+from maglev.vocabulary import BASELINE, DESIGNED, GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
-_STATUS = {GIVEN: "given", BEYOND_SAMPLE: "too_few_exceedances", LOST: "infinite"}
+
+def dataset(
+    config: Config,
+    baseline: xr.Dataset | None = None,
+    design: xr.Dataset | None = None,
+    surrogate: xr.Dataset | None = None,
+) -> xr.Dataset:
+    """Limits of a baseline, or of what a surrogate predicts.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    baseline
+        Layout ``runs``; in its place the two others, as `of_surrogate` takes them.
+
+    Returns
+    -------
+    dataset
+        Layout ``limits``.
+    """
+    if baseline is not None:
+        return of_baseline(config, baseline)
+    if design is None or surrogate is None:
+        raise ValueError("limits: needs a baseline, or a design with its surrogate")
+    return of_surrogate(config, design, surrogate)
 
 
 def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
@@ -47,7 +72,7 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
     values, away = extremes(runs), lost(runs)
     n_lost = int(np.count_nonzero(away))
     low, high = binomial_interval(n_lost, away.size, config.study.confidence)
-    result = _dataset(
+    result = _put_together(
         config,
         baseline_limits(config, values, away),
         baseline_limits(config, values[~away], away[~away]),
@@ -138,7 +163,7 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
         ]
         for of in (losing, {})
     )
-    result = _dataset(
+    result = _put_together(
         config,
         limits,
         held_limits,
@@ -182,10 +207,10 @@ def _surrogate_limits(
 
 def status_numbers(limits: Limits) -> list[int]:
     """What can be said of each limit, as the code of a file (level,)."""
-    return [LIMIT_STATUS.index(_STATUS[status]) for status in limits.status]
+    return [LIMIT_STATUS.index(status) for status in limits.status]
 
 
-def _dataset(
+def _put_together(
     config: Config,
     limits: list[Limits],
     held_limits: list[Limits],
@@ -198,7 +223,7 @@ def _dataset(
     columns: dict[str, tuple[tuple[str, ...], np.ndarray]] = {}
     for name, of in (("limit", limits), ("held_limit", held_limits)):
         status = np.array([status_numbers(one) for one in of])
-        infinite = status == LIMIT_STATUS.index("infinite")
+        infinite = status == LIMIT_STATUS.index(INFINITE)
         for end, suffix in (("limit", ""), ("lower", "_low"), ("upper", "_high")):
             values = np.array([getattr(one, end) for one in of])
             if end != "lower":  # losses alone are likelier: no finite limit, no upper end
@@ -207,7 +232,7 @@ def _dataset(
         columns[f"{name}_status"] = (level, status)
     for response, name in enumerate(RESPONSES):
         said = [
-            f"{p:g}: {value:.4g}" if code == 0 else f"{p:g}: {LIMIT_STATUS[code]}"
+            f"{p:g}: {value:.4g}" if LIMIT_STATUS[code] == GIVEN else f"{p:g}: {LIMIT_STATUS[code]}"
             for p, value, code in zip(
                 config.study.failure_probability,
                 columns["limit"][1][response],
@@ -227,3 +252,17 @@ def _dataset(
         },
         coords=coordinates(failure_probability=list(config.study.failure_probability)),
     )
+
+
+STAGE = Stage(
+    name="limits",
+    of="method",
+    reads=(*PREDICTING, "study.failure_probability"),
+    inputs={
+        "baseline": Input("runs", methods=(BASELINE,)),
+        "design": Input("design", methods=DESIGNED),
+        "surrogate": Input("surrogate", methods=DESIGNED),
+    },
+    layout="limits",
+    compute=dataset,
+)

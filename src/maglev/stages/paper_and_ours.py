@@ -7,9 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import DECISIONS, METHODS, RESPONSES, SOURCES
+from maglev.parameters import Config
+from maglev.stage import Input, Stage
 from maglev.stages.extremes import lost
 from maglev.stages.tables import markdown, number
+from maglev.vocabulary import DECISIONS, METHODS, RESPONSES, SOURCES
 
 RESPONSE = "girder_displacement_z"
 """The response that the paper's surviving numbers speak of."""
@@ -36,17 +38,20 @@ _NORMAL_PEAK = 1.0 / np.sqrt(2.0 * np.pi)
 
 
 def dataset(
-    densities: Mapping[str, xr.Dataset],
-    designs: Mapping[str, xr.Dataset],
+    config: Config,
+    density: Mapping[str, xr.Dataset],
+    design: Mapping[str, xr.Dataset],
     accuracy: xr.Dataset,
 ) -> xr.Dataset:
     """Set our numbers of the validation case beside the paper's.
 
     Parameters
     ----------
-    densities
+    config
+        The configuration, of which nothing is read.
+    density
         Layout ``density``, by method; the baseline among them.
-    designs
+    design
         Layout ``design``, by method.
     accuracy
         Layout ``accuracy``, of these designs.
@@ -62,11 +67,11 @@ def dataset(
     ValueError
         If there is no baseline among the densities.
     """
-    if "mcm" not in densities:
+    if "mcm" not in density:
         raise ValueError("the paper's numbers are compared with a baseline, got no 'mcm' density")
     names = list(METHODS)
     at = RESPONSES.index(RESPONSE)
-    own = {name: one.isel(response=at) for name, one in densities.items()}
+    own = {name: one.isel(response=at) for name, one in density.items()}
     peaks = {name: _peak(one) for name, one in own.items()}
     errors = {name: peak / peaks["mcm"] - 1.0 for name, peak in peaks.items() if name != "mcm"}
     rmse, rmse_n_runs = _rmse(accuracy, at)
@@ -97,7 +102,7 @@ def dataset(
         "paper_peak": _why_peak(own["mcm"], peaks["mcm"], sigma),
         "paper_peak_error": _why_peak_error(own, peaks, errors),
         "paper_rmse": _why_rmse(rmse, rmse_n_runs, sigma, n_runs["mcm"]),
-        "paper_n_runs": _why_n_runs(designs),
+        "paper_n_runs": _why_n_runs(design),
         "paper_deviation": (
             "the paper states none: theirs is that of a normal density with its peak; ours is "
             f"{sigma / PAPER_DEVIATION:.2f} times as large, at other gains, irregularity and "
@@ -241,3 +246,24 @@ def _rmse(accuracy: xr.Dataset, response: int) -> tuple[dict[str, float], dict[s
             errors[METHODS[code]] = float(found[best])
             numbers[METHODS[code]] = int(n_runs[best])
     return errors, numbers
+
+
+def table(found: xr.Dataset) -> tuple[list[dict[str, object]], str]:
+    """Rows and text of the table of a case."""
+    heading = f"What survives of the paper, and ours, case '{found.attrs['case']}'"
+    return rows(found), text(found, heading)
+
+
+STAGE = Stage(
+    name="paper_and_ours",
+    of="case",
+    reads=(),
+    inputs={
+        "density": Input("density", by=("method",)),
+        "design": Input("design", by=("method",)),
+        "accuracy": Input("accuracy"),
+    },
+    layout="paper_and_ours",
+    compute=dataset,
+    table=table,
+)

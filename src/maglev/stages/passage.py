@@ -7,6 +7,8 @@ import xarray as xr
 
 from maglev.parameters import Config
 from maglev.simulation import simulate
+from maglev.stage import Stage
+from maglev.stages.reads import TRAIN_ON_GUIDEWAY
 
 
 def dataset(config: Config) -> xr.Dataset:
@@ -28,3 +30,12 @@ def dataset(config: Config) -> xr.Dataset:
         As `maglev.simulate`.
     """
     return simulate(config, np.array([config.gains.as_row]), histories=True)
+
+
+STAGE = Stage(
+    name="passage",
+    of="run",
+    reads=(*TRAIN_ON_GUIDEWAY, "gains"),
+    layout="passage",
+    compute=dataset,
+)

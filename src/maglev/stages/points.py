@@ -1,4 +1,4 @@
-"""Point sets of a case: the baseline, the designs' first points and candidates, representatives.
+"""The random gains of a case: which they are, how they are distributed, and points of them.
 
 Every set draws from random numbers of its own, which the seed and the name of the set decide.  The
 names of the cases play no part: with the same random gains, all cases have the same points in
@@ -7,25 +7,17 @@ standard form.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 from scipy.stats import norm
 
-from maglev.datasets import GAINS
+from maglev.arrays import FloatArray, IntArray
 from maglev.parameters import Case, Config
+from maglev.stages.randomness import generator
 from maglev.uncertainty.distributions import Marginals
-from maglev.uncertainty.pointset import PointSet, gf_discrepancy, gf_points, sobol_points
-
-FloatArray = npt.NDArray[np.float64]
-
-
-def generator(seed: int, *key: str | int) -> np.random.Generator:
-    """Random numbers that belong to a seed and a key of words and numbers alone."""
-    words = [list(part.encode()) if isinstance(part, str) else [part] for part in key]
-    return np.random.default_rng([seed, *(number for word in words for number in word)])
+from maglev.uncertainty.pointset import PointSet, gf_points
+from maglev.vocabulary import GAINS
 
 
 def case_of(config: Config, name: str) -> Case:
@@ -41,7 +33,7 @@ def case_of(config: Config, name: str) -> Case:
     return config.cases[name]
 
 
-def random_columns(case: Case) -> npt.NDArray[np.int64]:
+def random_columns(case: Case) -> IntArray:
     """Columns (parameter,) of the random gains in an array of all four, in rising order."""
     return np.flatnonzero([name.removesuffix("_gain") in case.random_gains for name in GAINS])
 
@@ -59,7 +51,7 @@ def marginals(config: Config, case: str) -> Marginals:
     Returns
     -------
     marginals
-        One distribution per random gain, in the order of `maglev.datasets.GAINS`.
+        One distribution per random gain, in the order of `maglev.vocabulary.GAINS`.
 
     Raises
     ------
@@ -109,64 +101,13 @@ def baseline(config: Config, case: str, n: int, stream: str = "baseline") -> Flo
     return generator(config.seed, stream).standard_normal(shape)
 
 
-def track_seeds(config: Config, n: int, stream: str = "track") -> npt.NDArray[np.int64]:
+def track_seeds(config: Config, n: int, stream: str = "track") -> IntArray:
     """Seeds (sample,) of the irregularities that the samples meet; seed i does not depend on n."""
     return generator(config.seed, stream).integers(0, 2**31, size=n)
 
 
-def _baseline_set(config: Config, case: str) -> PointSet:
-    inputs, n = marginals(config, case), n_samples(config, case)
-    standard = baseline(config, case, n)
-    points, equal = inputs.from_standard(standard), np.full(n, 1.0 / n)
-    return PointSet(
-        points=points,
-        standard=standard,
-        probability=equal,
-        counting_error=np.zeros(n),
-        discrepancy=gf_discrepancy(points, equal, inputs),
-        n_counting=0,
-        n_floored=0,
-    )
-
-
-def _gf_set(size: Callable[[Config, int], int], name: str) -> Callable[[Config, str], PointSet]:
-    def drawn(config: Config, case: str) -> PointSet:
-        inputs = marginals(config, case)
-        rng = generator(config.seed, name)
-        return gf_points(inputs, size(config, inputs.n), rng, config.study.n_counting)
-
-    return drawn
-
-
-def _initial_size(method: str) -> Callable[[Config, int], int]:
-    def size(config: Config, n_parameters: int) -> int:
-        design = getattr(config.study, method)
-        return min(design.n_initial, design.initial_per_gain * n_parameters)
-
-    return size
-
-
-def _tail_candidates(config: Config, case: str) -> PointSet:
-    rng = generator(config.seed, "candidates_asm")
-    return sobol_points(marginals(config, case), config.study.asm.n_candidates, rng)
-
-
-SETS: Mapping[str, Callable[[Config, str], PointSet]] = {
-    "baseline": _baseline_set,
-    "representative": _gf_set(lambda c, _: c.study.n_representative, "representative"),
-    "osm": _gf_set(lambda c, _: c.study.osm.n_runs, "osm"),
-    "initial_asm_paper": _gf_set(_initial_size("asm_paper"), "initial_asm_paper"),
-    "candidates_asm_paper": _gf_set(
-        lambda c, _: c.study.asm_paper.n_candidates, "candidates_asm_paper"
-    ),
-    "initial_asm": _gf_set(_initial_size("asm"), "initial_asm"),
-    "candidates_asm": _tail_candidates,
-}
-"""The point sets of a case by name: plain random numbers, GF points, or Sobol' points."""
-
-
-def dataset(config: Config, case: str, name: str) -> xr.Dataset:
-    """One point set of a case.
+def dataset(config: Config, case: str, points: PointSet) -> xr.Dataset:
+    """A point set of a case in the layout ``points``, with all four gains.
 
     Parameters
     ----------
@@ -174,26 +115,9 @@ def dataset(config: Config, case: str, name: str) -> xr.Dataset:
         The configuration.
     case
         Name of the case.
-    name
-        A key of `SETS`.
-
-    Returns
-    -------
-    dataset
-        Layout ``points``.
-
-    Raises
-    ------
-    ValueError
-        If there is no such case or set.
-
-    References
-    ----------
-    docs/theory/point_sets.md.
+    points
+        In the random gains of the case.
     """
-    if name not in SETS:
-        raise ValueError(f"there is no point set '{name}', known are: {', '.join(SETS)}")
-    points = SETS[name](config, case)
     gains = gains_at(config, case, points.standard)
     return xr.Dataset(
         {
@@ -208,3 +132,25 @@ def dataset(config: Config, case: str, name: str) -> xr.Dataset:
             "parameter": random_columns(case_of(config, case)).astype(np.int8),
         },
     )
+
+
+def gf_set(config: Config, case: str, n: int, key: str) -> PointSet:
+    """Points of a case by the least GF-discrepancy.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    case
+        Name of the case.
+    n
+        Number of points.
+    key
+        What the random numbers belong to.
+
+    References
+    ----------
+    docs/theory/point_sets.md.
+    """
+    rng = generator(config.seed, key)
+    return gf_points(marginals(config, case), n, rng, config.study.n_counting)

@@ -8,10 +8,12 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import METHODS
 from maglev.parameters import Config
+from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, extremes, lost, method_number
+from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import stored_predictor
+from maglev.vocabulary import METHODS
 
 _LOG = logging.getLogger(__name__)
 
@@ -19,8 +21,8 @@ _LOG = logging.getLogger(__name__)
 def dataset(
     config: Config,
     baseline: xr.Dataset,
-    designs: Mapping[str, xr.Dataset],
-    surrogates: Mapping[str, xr.Dataset],
+    design: Mapping[str, xr.Dataset],
+    surrogate: Mapping[str, xr.Dataset],
 ) -> xr.Dataset:
     """Predict every run of the baseline by the surrogate of every method.
 
@@ -30,9 +32,9 @@ def dataset(
         The configuration.
     baseline
         Layout ``runs``.
-    designs
+    design
         Layout ``design``, by method.
-    surrogates
+    surrogate
         Layout ``surrogate``, by method, of these designs.
 
     Returns
@@ -46,18 +48,18 @@ def dataset(
     ValueError
         If a method has a design and no surrogate, or the other way round.
     """
-    if set(designs) != set(surrogates):
+    if set(design) != set(surrogate):
         raise ValueError(
-            f"every method needs a design and a surrogate, got designs of {sorted(designs)} and "
-            f"surrogates of {sorted(surrogates)}"
+            f"every method needs a design and a surrogate, got designs of {sorted(design)} and "
+            f"surrogates of {sorted(surrogate)}"
         )
-    names = sorted(designs, key=METHODS.index)
+    names = sorted(design, key=METHODS.index)
     truth, away = extremes(baseline), lost(baseline)
     points = baseline["standard"].to_numpy()
     sigma = truth[~away].std(axis=0)
     predicted, without = [], []
     for name in names:
-        found = stored_predictor(config, designs[name], surrogates[name])
+        found = stored_predictor(config, design[name], surrogate[name])
         predicted.append(found.surrogate.predict(points))
         without.append(~found.held(points))
         _LOG.info(
@@ -71,7 +73,7 @@ def dataset(
             "predicted_by": (("method", "sample", "response"), np.array(predicted)),
             "lost_by": (("method", "sample"), np.array(without, dtype=np.int8)),
             "prediction_rmse": (("method", "response"), np.array(rmse)),
-            "method_n_runs": ("method", [designs[name].sizes["sample"] for name in names]),
+            "method_n_runs": ("method", [design[name].sizes["sample"] for name in names]),
             "sigma": ("response", sigma),
         },
         coords=coordinates(
@@ -79,3 +81,17 @@ def dataset(
             sample=baseline["sample"].to_numpy(),
         ),
     )
+
+
+STAGE = Stage(
+    name="prediction",
+    of="case",
+    reads=PREDICTING,
+    inputs={
+        "baseline": Input("runs"),
+        "design": Input("design", by=("method",)),
+        "surrogate": Input("surrogate", by=("method",)),
+    },
+    layout="prediction",
+    compute=dataset,
+)

@@ -1,4 +1,4 @@
-"""Runs of the model, each computed once: a store that all cases and methods share, and baselines.
+"""Runs of the model, each computed once: a store that all cases and methods share.
 
 The store is a folder for all that decides a run but its gains (and its track seed): train,
 guideway, irregularity, passage, seed and code.  In it lie small files of some runs each, written
@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import threading
 import time
 from collections.abc import Sequence
 from functools import cache
@@ -22,20 +23,22 @@ import numpy.typing as npt
 import xarray as xr
 
 from maglev import datasets
-from maglev.datasets import GAINS, TRACK_PARTS
+from maglev.arrays import FloatArray, IntArray
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
 from maglev.simulation import simulate
-from maglev.stages.points import baseline, case_of, gains_at, n_samples, random_columns, track_seeds
+from maglev.stages.points import case_of, gains_at, random_columns
+from maglev.stages.reads import TRAIN_ON_GUIDEWAY
+from maglev.vocabulary import GAINS
 
 _LOG = logging.getLogger(__name__)
+
+_FILES = threading.Lock()
+"""Held while a file is open: the NetCDF library serves one thread at a time."""
 
 BATCH = 32
 """Runs computed and stored together, whole rows of samples of the production solver: what a kill
 loses at most."""
-
-DECIDING = ("seed", "train", "guideway", "irregularity", "passage")
-"""Sections of the configuration that decide a run, beside its gains."""
 
 
 @cache
@@ -50,7 +53,7 @@ def _code() -> str:
 def content(config: Config) -> dict[str, object]:
     """All of a configuration that decides a run, beside its gains; files by their bytes."""
     whole = config.quantities()
-    part = {name: whole[name] for name in DECIDING}
+    part = {name: whole[name] for name in TRAIN_ON_GUIDEWAY}
     profile = config.irregularity.profile_file
     if profile is not None:
         part["irregularity"] |= {"profile_file": f"sha256:{datasets.file_hash(profile)}"}
@@ -68,7 +71,7 @@ def folder_of(config: Config, store: str | Path) -> Path:
     return Path(store) / "runs" / key_of(content(config), _code())
 
 
-def _row_keys(gains: npt.NDArray[np.float64], seeds: npt.NDArray[np.int64] | None) -> list[bytes]:
+def _row_keys(gains: FloatArray, seeds: IntArray | None) -> list[bytes]:
     """What each run is found by: the bytes of its gains, and of its track seed if it has one."""
     keys = [row.tobytes() for row in np.ascontiguousarray(gains, dtype="<f8")]
     if seeds is None:
@@ -77,9 +80,9 @@ def _row_keys(gains: npt.NDArray[np.float64], seeds: npt.NDArray[np.int64] | Non
 
 
 @cache
-def _keys_in(path: Path) -> tuple[bytes, ...]:
-    """What the runs of one file are found by; a file of the store never changes."""
-    with netCDF4.Dataset(path) as file:
+def _keys_in(path: Path, written: int) -> tuple[bytes, ...]:
+    """What the runs of one file are found by, once for each time [ns] at which it was written."""
+    with _FILES, netCDF4.Dataset(path) as file:
         gains = np.stack([np.asarray(file[name][:], dtype=np.float64) for name in GAINS], axis=1)
         seeds = None
         if "track_seed" in file.variables:
@@ -92,7 +95,7 @@ def _stored(folder: Path) -> dict[bytes, tuple[Path, int]]:
     return {
         key: (path, row)
         for path in sorted(folder.glob("*.nc"))
-        for row, key in enumerate(_keys_in(path))
+        for row, key in enumerate(_keys_in(path.absolute(), path.stat().st_mtime_ns))
     }
 
 
@@ -167,8 +170,8 @@ def stored_runs(
 
 def _compute(
     config: Config,
-    gains: npt.NDArray[np.float64],
-    seeds: npt.NDArray[np.int64] | None,
+    gains: FloatArray,
+    seeds: IntArray | None,
     folder: Path,
     n_threads: int,
 ) -> Path:
@@ -180,14 +183,16 @@ def _compute(
         computed["track_seed"] = (("sample",), seeds)
     name = hashlib.sha256(b"".join(_row_keys(gains, seeds))).hexdigest()[:16]
     path = folder / f"{name}.nc"
-    datasets.write(computed, path, "passage", config=content(config), code=_code())
+    with _FILES:
+        datasets.write(computed, path, "passage", config=content(config), code=_code())
     return path
 
 
 def _gathered(places: Sequence[tuple[Path, int]]) -> xr.Dataset:
     """Runs at their places in the store, in order."""
     files = {path: number for number, path in enumerate(dict.fromkeys(path for path, _ in places))}
-    parts = [datasets.read(path, "passage") for path in files]
+    with _FILES:
+        parts = [datasets.read(path, "passage") for path in files]
     offset = np.cumsum([0, *(part.sizes["sample"] for part in parts)])
     whole = xr.concat(
         parts,
@@ -205,11 +210,11 @@ def _gathered(places: Sequence[tuple[Path, int]]) -> xr.Dataset:
 def runs(
     config: Config,
     case: str,
-    standard: npt.NDArray[np.float64],
-    probability: npt.NDArray[np.float64],
+    standard: FloatArray,
+    probability: FloatArray,
     store: str | Path,
     *,
-    track_seeds: npt.NDArray[np.int64] | None = None,
+    track_seeds: IntArray | None = None,
     n_threads: int = 1,
 ) -> xr.Dataset:
     """Runs of a case at standardised points.
@@ -248,132 +253,3 @@ def runs(
     return passages.assign(
         standard=(("sample", "parameter"), standard), probability=(("sample",), probability)
     ).assign_coords(parameter=random_columns(case_of(config, case)).astype(np.int8))
-
-
-def chunk(
-    config: Config, case: str, rows: range, store: str | Path, n_threads: int = 1
-) -> xr.Dataset:
-    """Some runs of the baseline of a case.
-
-    Parameters
-    ----------
-    config
-        The configuration.
-    case
-        Name of the case.
-    rows
-        Numbers of the samples, rising by one; how many the baseline has plays no part.
-    store
-        Folder of the store.
-    n_threads
-        Rows of samples computed at the same time.
-
-    Returns
-    -------
-    dataset
-        Layout ``runs``, with ``track_seed`` if the case has a random track; each sample under its
-        number in the baseline, all equally likely.
-
-    Raises
-    ------
-    ValueError
-        If there are no such samples, or as `stored_runs`.
-    """
-    if not rows or rows.start < 0 or rows.step != 1:
-        raise ValueError(f"samples must be numbered upwards from 0 or more, got {rows}")
-    seeds = None
-    if case_of(config, case).random_track:
-        seeds = track_seeds(config, rows.stop)[rows.start :]
-    result = runs(
-        config,
-        case,
-        baseline(config, case, rows.stop)[rows.start :],
-        np.full(len(rows), 1.0 / len(rows)),
-        store,
-        track_seeds=seeds,
-        n_threads=n_threads,
-    )
-    return result.assign_coords(sample=np.array(rows))
-
-
-def gather(points: xr.Dataset, chunks: Sequence[xr.Dataset]) -> xr.Dataset:
-    """Put the chunks of a baseline together.
-
-    Parameters
-    ----------
-    points
-        Layout ``points``: the baseline.
-    chunks
-        Layout ``runs``, in order.
-
-    Returns
-    -------
-    dataset
-        Layout ``runs``; all samples are equally likely.
-
-    Raises
-    ------
-    ValueError
-        If a sample is missing, stands twice or was run at another point.
-    """
-    whole = xr.concat(
-        chunks,
-        "sample",
-        data_vars="minimal",
-        coords="minimal",
-        compat="override",
-        combine_attrs="override",
-    )
-    n = points.sizes["sample"]
-    if not np.array_equal(whole["sample"], np.arange(n)):
-        raise ValueError(f"the chunks must hold the samples 0 to {n - 1} once each, in order")
-    if not np.array_equal(whole["standard"], points["standard"]):
-        raise ValueError("the chunks must have been run at the points of the baseline; do it again")
-    whole.attrs = {name: chunks[0].attrs[name] for name in ("time_step", "n_steps")}
-    whole["probability"] = (("sample",), points["probability"].values)
-    return whole
-
-
-def track_part(
-    config: Config, case: str, part: str, store: str | Path, n_threads: int = 1
-) -> xr.Dataset:
-    """Further runs of a case with a random track, to tell what gains and track contribute.
-
-    Parameters
-    ----------
-    config
-        The configuration.
-    case
-        Name of a case with a random track.
-    part
-        One of `maglev.datasets.TRACK_PARTS`; its sample i has the gains or the track of sample i of
-        the baseline.
-    store
-        Folder of the store.
-    n_threads
-        Rows of samples computed at the same time.
-
-    Returns
-    -------
-    dataset
-        Layout ``runs`` with ``track_seed``.
-
-    Raises
-    ------
-    ValueError
-        If there is no such case or part, or the track of the case is not random.
-    """
-    if part not in TRACK_PARTS:
-        raise ValueError(f"part must be one of {', '.join(TRACK_PARTS)}, got '{part}'")
-    if not case_of(config, case).random_track:
-        raise ValueError(f"cases.{case}.random_track must be true for its part '{part}'")
-    n = n_samples(config, case)
-    standard = baseline(config, case, n, "other gains" if part == "other_gains" else "baseline")
-    if part == "track_only":
-        standard = np.zeros_like(standard)
-    seeds = track_seeds(config, n, "other track" if part == "other_track" else "track")
-    probability = np.full(n, 1.0 / n)
-    if part == "gains_only":  # the runs of a case without a random track: shared with it
-        result = runs(config, case, standard, probability, store, n_threads=n_threads)
-        return result.assign(track_seed=(("sample",), np.full(n, config.seed)))
-    return runs(config, case, standard, probability, store, track_seeds=seeds, n_threads=n_threads)

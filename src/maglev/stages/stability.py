@@ -10,6 +10,7 @@ from maglev.mechanics import train as train_model
 from maglev.mechanics.linear import Block, blocks, border, growth_rate
 from maglev.mechanics.responses import checked_gains
 from maglev.parameters import Config, Control
+from maglev.stage import Stage
 
 PROPORTIONAL_RANGE, DERIVATIVE_RANGE = (0.4, 1.6), (0.0, 1.6)
 """Gains of the map over their means [-]: four deviations on either side at a coefficient of
@@ -130,3 +131,12 @@ def _border(
     if growth_rate(parts, gains) >= 0:
         return float("nan")
     return border(parts, gains, gain, limit, n_steps)
+
+
+STAGE = Stage(
+    name="stability",
+    of="run",
+    reads=("train", "gains", "control"),
+    layout="stability",
+    compute=dataset,
+)

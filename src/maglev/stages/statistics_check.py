@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import LIMIT_STATUS, METHODS, RESPONSES
+from maglev.arrays import FloatArray
 from maglev.parameters import Config
-from maglev.stages.density import binomial_interval
-from maglev.stages.extremes import FloatArray, extremes, lost
+from maglev.stage import Input, Stage
+from maglev.stages.extremes import extremes, lost
 from maglev.stages.limits import baseline_limits, status_numbers
+from maglev.uncertainty.reliability import binomial_interval
+from maglev.vocabulary import LIMIT_STATUS, METHODS, RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -59,7 +61,7 @@ class Check:
 
 def dataset(
     config: Config,
-    baselines: Mapping[str, xr.Dataset],
+    baseline: Mapping[str, xr.Dataset],
     limits: Mapping[tuple[str, str], xr.Dataset],
 ) -> xr.Dataset:
     """Check every case that has a baseline.
@@ -74,7 +76,7 @@ def dataset(
     ----------
     config
         The configuration.
-    baselines
+    baseline
         Layout ``runs``, by case.
     limits
         Layout ``limits``, by case and method, of these cases.
@@ -90,13 +92,13 @@ def dataset(
     ValueError
         If there is no baseline, or a case has limits and no baseline.
     """
-    if not baselines:
+    if not baseline:
         raise ValueError("the check of the statistics needs at least one baseline, got none")
-    strange = sorted({case for case, _ in limits} - set(baselines))
+    strange = sorted({case for case, _ in limits} - set(baseline))
     if strange:
         raise ValueError(f"the case '{strange[0]}' has limits and no baseline; run its baseline")
     checks: list[Check] = []
-    for case, runs in baselines.items():
+    for case, runs in baseline.items():
         values, away = extremes(runs), lost(runs)
         checks += _halves(config, case, HALVES, values, away)
         checks += _halves(config, case, HELD_HALVES, values[~away], away[~away])
@@ -117,7 +119,7 @@ def dataset(
             words,
             *(passed.count(code) for code in (YES, NO, UNDECIDED)),
         )
-    return _dataset(checks, list(baselines))
+    return _dataset(checks, list(baseline))
 
 
 def _halves(
@@ -233,3 +235,16 @@ def _dataset(checks: list[Check], cases: list[str]) -> xr.Dataset:
         "flag_meanings": " ".join(cases),
     }
     return result
+
+
+STAGE = Stage(
+    name="statistics_check",
+    of="run",
+    reads=("study.confidence", "study.failure_probability"),
+    inputs={
+        "baseline": Input("runs", by=("case",)),
+        "limits": Input("limits", by=("case", "method")),
+    },
+    layout="statistics_check",
+    compute=dataset,
+)

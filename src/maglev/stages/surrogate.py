@@ -7,27 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from scipy import stats
 
-from maglev.datasets import SURROGATES
+from maglev.arrays import FloatArray
 from maglev.parameters import Config
-from maglev.stages.extremes import (
-    FloatArray,
-    coordinates,
-    extremes,
-    generator,
-    lost,
-    population,
-)
+from maglev.stage import Input, Stage
+from maglev.stages.extremes import coordinates, extremes, lost, population
+from maglev.stages.randomness import generator_of_statistics
+from maglev.stages.reads import PREDICTING, SURROGATE_OF_METHODS
 from maglev.uncertainty.failure_region import Loss, learnt_loss
 from maglev.uncertainty.selection import Selected, fit_selected, rebuilt
+from maglev.uncertainty.sobol import sobol_indices
 from maglev.uncertainty.surrogate import relative_error
+from maglev.vocabulary import DESIGNED, SURROGATES
 
 _LOG = logging.getLogger(__name__)
-
-N_SOBOL, N_SOBOL_SETS = 1024, 16
-"""Points of one Saltelli set and number of sets, each with a scrambling of its own; assumed: the
-intervals come out at a few hundredths."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,11 +91,6 @@ def stored_predictor(config: Config, design: xr.Dataset, surrogate: xr.Dataset) 
 def dataset(config: Config, method: str, design: xr.Dataset) -> xr.Dataset:
     """Fit the surrogate of a method's design.
 
-    Sobol' indices are those of the surrogate over all of the input density, its predictions kept
-    within the values of the runs: beyond them, towards the lost region, it would extrapolate.
-    Their intervals are those of ``N_SOBOL_SETS`` independent scramblings and do not know the
-    surrogate's own error.
-
     Parameters
     ----------
     config
@@ -124,11 +112,12 @@ def dataset(config: Config, method: str, design: xr.Dataset) -> xr.Dataset:
 
     References
     ----------
-    Saltelli et al., Comput. Phys. Commun. 181 (2010) 259-270; scipy.stats.sobol_indices.
+    `maglev.uncertainty.sobol.sobol_indices`.
     """
     found = predictor(config, design, getattr(config.study, method).surrogate)
     surrogate, loss = found.surrogate, found.loss
-    first, total = sobol_indices(surrogate, config.seed, config.study.confidence)
+    rng = generator_of_statistics(config.seed, "Sobol' indices")
+    first, total = sobol_indices(surrogate, rng, config.study.confidence)
     error = relative_error(surrogate)
     _LOG.info(
         "%d runs, %d lost; %s; leave-one-out error %s",
@@ -171,51 +160,19 @@ def loss_comment(loss: Loss) -> str:
     return "from the region learnt from the lost runs; the interval is its credible one"
 
 
-def sobol_indices(
-    surrogate: Selected, seed: int, confidence: float
-) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
-    """First-order and total Sobol' indices of a surrogate with intervals.
-
-    Parameters
-    ----------
-    surrogate
-        Surrogate in standard normal inputs.
-    seed
-        Seed of the configuration.
-    confidence
-        Two-sided confidence of the intervals [-].
-
-    Returns
-    -------
-    first, total : three arrays (response, parameter)
-        Index, lower and upper end [-].
-    """
-    n_parameters = surrogate.points.shape[1]
-    lowest, highest = surrogate.values.min(axis=0), surrogate.values.max(axis=0)
-
-    def bounded(points: FloatArray) -> FloatArray:
-        return np.clip(surrogate.predict(points.T), lowest, highest).T
-
-    rng = generator(seed, "Sobol' indices")
-    shape = (N_SOBOL_SETS, len(surrogate.kinds), n_parameters)
-    first, total = np.empty(shape), np.empty(shape)
-    for number in range(N_SOBOL_SETS):
-        indices = stats.sobol_indices(
-            func=bounded, n=N_SOBOL, dists=[stats.norm()] * n_parameters, rng=rng
-        )
-        first[number] = indices.first_order.reshape(shape[1:])
-        total[number] = indices.total_order.reshape(shape[1:])
-    quantile = stats.t.ppf(0.5 + 0.5 * confidence, N_SOBOL_SETS - 1)
-
-    def with_ends(sets: FloatArray) -> tuple[FloatArray, ...]:
-        mean = sets.mean(axis=0)
-        half = quantile * sets.std(axis=0, ddof=1) / np.sqrt(N_SOBOL_SETS)
-        return mean, mean - half, mean + half
-
-    return with_ends(first), with_ends(total)
-
-
 def _loss(config: Config, points: FloatArray, away: np.ndarray) -> Loss:
     everywhere = population(config.seed, config.study.n_population, points.shape[1])
-    rng = generator(config.seed, "border of the lost region")
+    rng = generator_of_statistics(config.seed, "border of the lost region")
     return learnt_loss(points, away, everywhere, rng, config.study.confidence)
+
+
+STAGE = Stage(
+    name="surrogate",
+    of="method",
+    reads=(*PREDICTING, *SURROGATE_OF_METHODS),
+    inputs={"design": Input("design")},
+    takes={"method": str},
+    methods=DESIGNED,
+    layout="surrogate",
+    compute=dataset,
+)

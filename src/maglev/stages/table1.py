@@ -7,9 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import LIMIT_STATUS, METHODS, RESPONSE_UNITS, RESPONSES
+from maglev.parameters import Config
+from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, method_number
 from maglev.stages.tables import markdown, number
+from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, METHODS, RESPONSE_UNITS, RESPONSES
 
 _OF_METHOD = tuple(
     f"{name}{end}" for name in ("limit", "held_limit") for end in ("", "_low", "_high", "_status")
@@ -17,11 +19,13 @@ _OF_METHOD = tuple(
 _LOST = ("lost_probability", "lost_probability_low", "lost_probability_high")
 
 
-def dataset(limits: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def dataset(config: Config, limits: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Put the limits of the methods of one case side by side.
 
     Parameters
     ----------
+    config
+        The configuration, of which nothing is read.
     limits
         Layout ``limits``, by method.
 
@@ -142,9 +146,25 @@ def text(table: xr.Dataset, heading: str) -> str:
 def _cell(row: Mapping[str, object], prefix: str) -> str:
     """A limit with its interval, or why there is none."""
     status = row[f"{prefix}status"]
-    if status == "infinite":
+    if status == INFINITE:
         return "none, losses are likelier"
-    if status != "given":
+    if status != GIVEN:
         return str(status).replace("_", " ")
     limit, low, high = (number(row[f"{prefix}limit{end}"]) for end in ("", "_low", "_high"))
     return f"{limit} [{low}, {high}]"
+
+
+def table(found: xr.Dataset) -> tuple[list[dict[str, object]], str]:
+    """Rows and text of the table of a case."""
+    return rows(found), text(found, f"Limits of the extremes, case '{found.attrs['case']}'")
+
+
+STAGE = Stage(
+    name="table1",
+    of="case",
+    reads=(),
+    inputs={"limits": Input("limits", by=("method",))},
+    layout="table1",
+    compute=dataset,
+    table=table,
+)

@@ -8,18 +8,22 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import RESPONSES
 from maglev.parameters import Config
+from maglev.stage import Input, Stage
 from maglev.stages.density import places
-from maglev.stages.extremes import coordinates, extremes, generator, lost
+from maglev.stages.extremes import coordinates, extremes, lost
+from maglev.stages.randomness import generator_of_statistics
 from maglev.uncertainty.gdee import direct_density, silverman_bandwidth
 from maglev.uncertainty.samples import held_part
 from maglev.uncertainty.shares import pick_freeze_shares
+from maglev.vocabulary import RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
 
-def dataset(config: Config, both: xr.Dataset, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
+def dataset(
+    config: Config, baseline: xr.Dataset, track_runs: Mapping[str, xr.Dataset]
+) -> xr.Dataset:
     """Densities with gains, track or both random, and the shares of the variance.
 
     Shares are closed Sobol' indices by pick-freeze, over the samples of which all three runs held.
@@ -28,10 +32,10 @@ def dataset(config: Config, both: xr.Dataset, parts: Mapping[str, xr.Dataset]) -
     ----------
     config
         The configuration.
-    both
+    baseline
         Layout ``runs``: gains i on track i.
-    parts
-        Layout ``runs``, as many samples, by the names of `maglev.datasets.TRACK_PARTS`.
+    track_runs
+        Layout ``runs``, as many samples, by the names of `maglev.vocabulary.TRACK_PARTS`.
 
     Returns
     -------
@@ -48,6 +52,7 @@ def dataset(config: Config, both: xr.Dataset, parts: Mapping[str, xr.Dataset]) -
     ----------
     Janon et al., ESAIM Probab. Stat. 18 (2014) 342-364.
     """
+    both, parts = baseline, track_runs
     sizes = {name: part.sizes["sample"] for name, part in parts.items()}
     n = both.sizes["sample"]
     if set(sizes.values()) != {n}:
@@ -58,7 +63,7 @@ def dataset(config: Config, both: xr.Dataset, parts: Mapping[str, xr.Dataset]) -
     kept = ~np.logical_or.reduce(
         [lost(part) for part in (both, parts["other_track"], parts["other_gains"])]
     )
-    rng = generator(config.seed, "bootstrap of the shares")
+    rng = generator_of_statistics(config.seed, "bootstrap of the shares")
     rows, shares = [], []
     for response, name in enumerate(RESPONSES):
         held = {key: held_part(values[key][:, response], lost(part)) for key, part in sets.items()}
@@ -101,3 +106,13 @@ def dataset(config: Config, both: xr.Dataset, parts: Mapping[str, xr.Dataset]) -
         f"{np.count_nonzero(kept)} of {n} samples, those of which all three runs held"
     )
     return result
+
+
+STAGE = Stage(
+    name="track_split",
+    of="case",
+    reads=("seed", "study.confidence"),
+    inputs={"baseline": Input("runs"), "track_runs": Input("runs", by=("part",))},
+    layout="track_split",
+    compute=dataset,
+)

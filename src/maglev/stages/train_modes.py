@@ -7,11 +7,12 @@ import re
 import numpy as np
 import xarray as xr
 
-from maglev.datasets import TRAIN_PARTS
 from maglev.mechanics import train as train_model
 from maglev.mechanics.linear import blocks, modes
 from maglev.mechanics.responses import checked_gains
 from maglev.parameters import Config
+from maglev.stage import Stage
+from maglev.vocabulary import TRAIN_PARTS
 
 _DEGREES_OF_FREEDOM = (  # in the order of `TRAIN_PARTS`
     r"body\.y",
@@ -62,3 +63,12 @@ def dataset(config: Config) -> xr.Dataset:
             "train_part": np.arange(len(TRAIN_PARTS)),
         },
     )
+
+
+STAGE = Stage(
+    name="train_modes",
+    of="run",
+    reads=("train", "gains", "control"),
+    layout="train_modes",
+    compute=dataset,
+)

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from maglev.uncertainty.surrogate import Array, Fit, Surrogate, checked_points
+from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.uncertainty.surrogate import Fit, Surrogate, checked_points
 
-Batch = Callable[[Surrogate, Array, Array, int], npt.NDArray[np.int64]]
+Batch = Callable[[Surrogate, FloatArray, FloatArray, int], IntArray]
 """A criterion of ``learning`` with its options bound: (surrogate, occupied, candidates, n_new)."""
 
 
@@ -40,12 +41,12 @@ class AdaptiveState:
         Whether the round had a prediction and a sample that held; never so for the first design.
     """
 
-    points: Array
-    values: Array
-    lost: npt.NDArray[np.bool_]
-    round_index: npt.NDArray[np.int64]
-    error: Array
-    tested: npt.NDArray[np.bool_]
+    points: FloatArray
+    values: FloatArray
+    lost: BoolArray
+    round_index: IntArray
+    error: FloatArray
+    tested: BoolArray
 
     @classmethod
     def empty(cls, n_parameters: int, n_responses: int) -> "AdaptiveState":
@@ -60,7 +61,7 @@ class AdaptiveState:
         )
 
     @property
-    def training(self) -> tuple[Array, Array]:
+    def training(self) -> tuple[FloatArray, FloatArray]:
         """Points (held, parameter) and values (held, response) of the samples that held."""
         return self.points[~self.lost], self.values[~self.lost]
 
@@ -80,8 +81,8 @@ class Proposal:
         The surrogate they were chosen by.
     """
 
-    points: Array
-    predicted: Array
+    points: FloatArray
+    predicted: FloatArray
     surrogate: Surrogate
 
 
@@ -222,10 +223,8 @@ def propose(
     return Proposal(points=points, predicted=surrogate.predict(points), surrogate=surrogate)
 
 
-def stop_reason(
-    state: AdaptiveState, *, threshold: float, n_rounds: int, n_largest: int
-) -> str | None:
-    """Why to stop, or ``None`` to go on.
+def decision(state: AdaptiveState, *, threshold: float, n_rounds: int, n_largest: int) -> str:
+    """Whether to go on or why to stop, in the words of `maglev.vocabulary.DECISIONS`.
 
     Parameters
     ----------
@@ -240,8 +239,8 @@ def stop_reason(
 
     Returns
     -------
-    reason
-        ``"error below threshold"``, ``"largest number of runs"`` or ``None``.
+    decision
+        Small errors come before the largest number of runs.
 
     Raises
     ------
@@ -256,7 +255,7 @@ def stop_reason(
     last = slice(max(state.tested.size - n_rounds, 0), None)
     if state.tested.size >= n_rounds and state.tested[last].all():
         if (state.error[last] <= threshold).all():
-            return "error below threshold"
+            return "error_below_threshold"
     if state.lost.size >= n_largest:
-        return "largest number of runs"
-    return None
+        return "largest_number_of_runs"
+    return "go_on"

@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import rv_continuous
 
+from maglev.arrays import FloatArray
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from scipy.stats.distributions import rv_frozen
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -190,30 +190,6 @@ class Marginals:
         for i, distribution in enumerate(self.distributions):
             c[..., i] = distribution.cdf(x[..., i])
         return c
-
-    def density_standard(self, u: npt.ArrayLike) -> FloatArray:
-        """Joint density of the inputs in standard form.
-
-        Parameters
-        ----------
-        u : (..., input)
-            Points in standard form [-].
-
-        Returns
-        -------
-        density : (...)
-            Product of the marginal densities of u [-]; it integrates to one over u.
-
-        Raises
-        ------
-        ValueError
-            If the last axis is not ``input`` or a value is not finite.
-        """
-        x = self.from_standard(u)
-        density = np.ones(x.shape[:-1])
-        for i, distribution in enumerate(self.distributions):
-            density *= distribution.pdf(x[..., i]) * self.deviation[i]
-        return density
 
     def _checked(self, points: npt.ArrayLike, what: str) -> FloatArray:
         array = np.asarray(points, dtype=float)

@@ -14,8 +14,9 @@ from scipy.special import expit
 from scipy.stats import binomtest
 from sklearn.linear_model import LogisticRegression
 
+from maglev.arrays import FloatArray, IntArray
 from maglev.uncertainty._border_kernels import border_chain
-from maglev.uncertainty.surrogate import Array, checked_points
+from maglev.uncertainty.surrogate import checked_points
 
 PRIOR_DEVIATION = {"constant": 6.0, "linear": 1.0, "quadratic": 0.1}
 """Prior standard deviations of the coefficients of the border [-]; assumed: a plane some three
@@ -52,10 +53,10 @@ class FailureRegion:
         Number of inputs.
     """
 
-    borders: Array
+    borders: FloatArray
     n_parameters: int
 
-    def lost_probability(self, points: npt.ArrayLike) -> Array:
+    def lost_probability(self, points: npt.ArrayLike) -> FloatArray:
         """Probability that a sample at each point is lost.
 
         Parameters
@@ -80,7 +81,7 @@ class FailureRegion:
             probability[start : start + BLOCK] = self._by_border(block).mean(axis=1)
         return probability
 
-    def total_probability(self, population: npt.ArrayLike) -> Array:
+    def total_probability(self, population: npt.ArrayLike) -> FloatArray:
         """Probability that a random sample is lost, for each border.
 
         Parameters
@@ -107,7 +108,7 @@ class FailureRegion:
             total += self._by_border(population[start : start + BLOCK]).sum(axis=0)
         return total / population.shape[0]
 
-    def _by_border(self, points: Array) -> Array:
+    def _by_border(self, points: FloatArray) -> FloatArray:
         """Probability (point, draw) to be lost, for each border."""
         return expit(SHARPNESS * (_features(points) @ self.borders.T))
 
@@ -186,7 +187,7 @@ class Loss:
     upper: float
     region: FailureRegion | None
 
-    def lost_probability(self, points: npt.ArrayLike) -> Array:
+    def lost_probability(self, points: npt.ArrayLike) -> FloatArray:
         """Probability (point,) that a sample at each point (point, parameter) is lost [-]."""
         if self.region is None:
             return np.zeros(len(np.asarray(points)))
@@ -254,8 +255,8 @@ def border_batch(
     candidates: npt.ArrayLike,
     n_new: int,
     *,
-    scores: Array | None = None,
-) -> npt.NDArray[np.int64]:
+    scores: FloatArray | None = None,
+) -> IntArray:
     """Candidates whose outcome says most about the probability of being lost.
 
     With I_d(c) the outcome at c and P_d the probability of being lost, both for border d, the
@@ -321,7 +322,7 @@ def border_batch(
     return chosen
 
 
-def _features(points: Array) -> Array:
+def _features(points: FloatArray) -> FloatArray:
     """Constant, inputs, squares and products (point, feature)."""
     s = points.shape[1]
     products = [points[:, i] * points[:, j] for i in range(s) for j in range(i, s)]

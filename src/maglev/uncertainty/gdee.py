@@ -11,11 +11,11 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import gaussian_kde
+from scipy.stats import gaussian_kde, norm
 
+from maglev.arrays import FloatArray
 from maglev.uncertainty import _kernels
 from maglev.uncertainty.samples import (
-    FloatArray,
     check_lost_probability,
     checked_probability,
     effective_size,
@@ -315,6 +315,57 @@ def direct_density(
     kernel = gaussian_kde(standard, bw_method=1.0, weights=probability)
     kernel.set_bandwidth(bandwidth / deviation / float(np.sqrt(kernel.covariance[0, 0])))
     return (1.0 - lost_probability) * kernel((at - mean) / deviation) / deviation
+
+
+def direct_density_band(
+    at: npt.ArrayLike,
+    values: npt.ArrayLike,
+    n: int,
+    *,
+    density: FloatArray,
+    bandwidth: float,
+    lost_probability: float = 0.0,
+    confidence: float = 0.95,
+) -> tuple[FloatArray, FloatArray]:
+    """Band of the sampling noise of a direct density of independent runs, place by place.
+
+    The density is a mean over all runs of the kernel φ_h, its variance that of the kernel over n;
+    the mean of φ_h² is the direct density with the bandwidth h/√2, over 2√π h.  The kernel's bias
+    is not in it.
+
+    Parameters
+    ----------
+    at : (place,)
+        Where the density is given [unit of the value].
+    values : (sample,)
+        Values that held [their unit].
+    n
+        Number of all runs.
+    density : (place,)
+        The direct density [1/unit].
+    bandwidth
+        Its kernel deviation h [unit].
+    lost_probability
+        Share of runs that did not hold [-].
+    confidence
+        Two-sided confidence [-].
+
+    Returns
+    -------
+    low, high : (place,)
+        Ends of the band [1/unit]; the lower one is at least 0.
+
+    References
+    ----------
+    Silverman, Density Estimation (1986), sec. 3.3.
+    """
+    h = bandwidth
+    narrower = direct_density(
+        at, values, bandwidth=h / np.sqrt(2.0), lost_probability=lost_probability
+    )
+    variance = np.maximum(narrower / (2.0 * np.sqrt(np.pi) * h) - density**2, 0.0) / n
+    half = norm.ppf(0.5 + 0.5 * confidence) * np.sqrt(variance)
+    return np.maximum(density - half, 0.0), density + half
 
 
 def silverman_bandwidth(values: npt.ArrayLike, probability: npt.ArrayLike | None = None) -> float:

@@ -13,8 +13,9 @@ from scipy.optimize import minimize
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
+from maglev.arrays import FloatArray
 from maglev.uncertainty import _radial_kernels as kernels
-from maglev.uncertainty.surrogate import Array, checked_points, checked_training
+from maglev.uncertainty.surrogate import checked_points, checked_training
 
 NUGGET = 1e-10
 """Variance added to the diagonal, over the variance of the response [-]: the default of
@@ -56,16 +57,16 @@ class Kriging:
         Lower Cholesky factor of K [-].
     """
 
-    points: Array
-    values: Array
-    mean: Array
-    deviation: Array
-    length: Array
-    amplitude: Array
-    weights: Array
-    factor: Array
+    points: FloatArray
+    values: FloatArray
+    mean: FloatArray
+    deviation: FloatArray
+    length: FloatArray
+    amplitude: FloatArray
+    weights: FloatArray
+    factor: FloatArray
 
-    def predict(self, points: npt.ArrayLike) -> Array:
+    def predict(self, points: npt.ArrayLike) -> FloatArray:
         """Posterior mean.
 
         Parameters
@@ -98,7 +99,7 @@ class Kriging:
             values[:, response] = total[:, 0]
         return self.mean + self.deviation * values
 
-    def gradient(self, points: npt.ArrayLike) -> Array:
+    def gradient(self, points: npt.ArrayLike) -> FloatArray:
         """Gradient of the posterior mean in closed form.
 
         Parameters
@@ -131,7 +132,7 @@ class Kriging:
             gradient[:, response] = self.deviation[response] * total[:, 0] / length
         return gradient
 
-    def leave_one_out(self) -> Array:
+    def leave_one_out(self) -> FloatArray:
         """Residual at each training point of the fit made without it, all parameters kept.
 
         e_k = α_k / (K⁻¹)_kk; mean, deviation, lengths and amplitude stay as they are.
@@ -147,7 +148,7 @@ class Kriging:
         """
         return self.deviation * self.weights / self._inverse_diagonal()
 
-    def leave_one_out_deviation(self) -> Array:
+    def leave_one_out_deviation(self) -> FloatArray:
         """Standard deviation that goes with each leave-one-out residual.
 
         Returns
@@ -161,7 +162,7 @@ class Kriging:
         """
         return self.deviation / np.sqrt(self._inverse_diagonal())
 
-    def standard_deviation(self, points: npt.ArrayLike) -> Array:
+    def standard_deviation(self, points: npt.ArrayLike) -> FloatArray:
         """Posterior standard deviation; a variance that rounding makes negative counts as zero.
 
         Parameters
@@ -189,7 +190,7 @@ class Kriging:
                 variance[start : start + BLOCK, response] = self.amplitude[response] - explained
         return self.deviation * np.sqrt(np.maximum(variance, 0.0))
 
-    def covariance(self, response: int, rows: npt.ArrayLike, columns: npt.ArrayLike) -> Array:
+    def covariance(self, response: int, rows: npt.ArrayLike, columns: npt.ArrayLike) -> FloatArray:
         """Posterior covariance of one response between two sets of points.
 
         Parameters
@@ -217,19 +218,19 @@ class Kriging:
         explained = self._whitened(response, rows).T @ self._whitened(response, columns)
         return self.deviation[response] ** 2 * (prior - explained)
 
-    def _prior(self, response: int, rows: Array, columns: Array) -> Array:
+    def _prior(self, response: int, rows: FloatArray, columns: FloatArray) -> FloatArray:
         """Prior covariance (row, column) of the standardised response."""
         length = self.length[response]
         matrix = np.empty((rows.shape[0], columns.shape[0]))
         kernels.radial_matrix(kernels.MATERN, 1.0, rows / length, columns / length, matrix)
         return self.amplitude[response] * matrix
 
-    def _whitened(self, response: int, points: Array) -> Array:
+    def _whitened(self, response: int, points: FloatArray) -> FloatArray:
         """L⁻¹ k (sample, point), whose squares sum to the explained variance."""
         prior = self._prior(response, self.points, points)
         return solve_triangular(self.factor[response], prior, lower=True, overwrite_b=True)
 
-    def _inverse_diagonal(self) -> Array:
+    def _inverse_diagonal(self) -> FloatArray:
         """(K⁻¹)_kk (sample, response)."""
         identity = np.eye(self.points.shape[0])
         return np.column_stack(
@@ -342,17 +343,17 @@ def conditioned_kriging(
     )
 
 
-def _process(amplitude: float, length: Array) -> GaussianProcessRegressor:
+def _process(amplitude: float, length: FloatArray) -> GaussianProcessRegressor:
     """A Gaussian process with given parameters, not fitted."""
     kernel = ConstantKernel(amplitude, AMPLITUDE_RANGE) * Matern(length, LENGTH_RANGE, nu=2.5)
     return GaussianProcessRegressor(kernel=kernel, alpha=NUGGET, optimizer=None)
 
 
-def _likeliest(points: Array, standardised: Array) -> Array:
+def _likeliest(points: FloatArray, standardised: FloatArray) -> FloatArray:
     """Logarithms of amplitude and lengths (1 + parameter,) that maximise the likelihood."""
     process = _process(1.0, np.ones(points.shape[1])).fit(points, standardised)
 
-    def unlikeliness(theta: Array) -> tuple[float, Array]:
+    def unlikeliness(theta: FloatArray) -> tuple[float, FloatArray]:
         likelihood, gradient = process.log_marginal_likelihood(
             theta, eval_gradient=True, clone_kernel=False
         )

@@ -12,12 +12,9 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-from maglev.uncertainty.surrogate import (
-    Array,
-    Surrogate,
-    SurrogateWithDeviation,
-    checked_points,
-)
+from maglev.arrays import FloatArray, IntArray
+from maglev.uncertainty.samples import weighted_quantile
+from maglev.uncertainty.surrogate import Surrogate, SurrogateWithDeviation, checked_points
 
 AGGREGATES = ("sum", "maximum")
 """How the scores of several responses become one: summed, or the largest."""
@@ -42,7 +39,7 @@ assumed, a hundred times the nugget of the Kriging."""
 
 def taylor_scores(
     distance: npt.ArrayLike, remainder: npt.ArrayLike, diameter: float, aggregate: str = "sum"
-) -> Array:
+) -> FloatArray:
     """Score J = D/max D + w R/max R with w = 1 − D/L, of several responses at once.
 
     Parameters
@@ -85,7 +82,7 @@ def taylor_scores(
     return score.sum(axis=1) if aggregate == "sum" else score.max(axis=1)
 
 
-def taylor_remainder(surrogate: Surrogate, candidates: npt.ArrayLike) -> Array:
+def taylor_remainder(surrogate: Surrogate, candidates: npt.ArrayLike) -> FloatArray:
     """Difference between the surrogate and its tangent at the nearest training point.
 
     R = |ŷ(c) − [Y_nn + ∇ŷ(u_nn)ᵀ(c − u_nn)]|.
@@ -127,8 +124,8 @@ def taylor_batch(
     *,
     aggregate: str = "sum",
     held_probability: npt.ArrayLike | None = None,
-    scores: Array | None = None,
-) -> npt.NDArray[np.int64]:
+    scores: FloatArray | None = None,
+) -> IntArray:
     """Candidates of the largest score J, one after another.
 
     After each choice the remainder of the chosen candidate is zero and it counts as a sample for
@@ -187,7 +184,7 @@ def predicted_limits(
     values: npt.ArrayLike,
     exceedances: Sequence[float],
     held_probability: npt.ArrayLike | None = None,
-) -> Array:
+) -> FloatArray:
     """Limits of a predicted sample in which every point may be lost.
 
     The smallest y with mean(1 − h) + mean(h · I{Y > y}) ≤ P; infinite if losses alone exceed P.
@@ -222,7 +219,7 @@ def predicted_limits(
             f"held_probability must be {n} numbers between 0 and 1, one per point, got shape "
             f"{held.shape}"
         )
-    return _weighted_limits(values, levels - np.mean(1.0 - held), held / n)
+    return _quantiles(values, held / n, levels - np.mean(1.0 - held))
 
 
 def tail_batch(
@@ -234,8 +231,8 @@ def tail_batch(
     aggregate: str = "sum",
     exceedances: Sequence[float] = EXCEEDANCES,
     held_probability: npt.ArrayLike | None = None,
-    scores: Array | None = None,
-) -> npt.NDArray[np.int64]:
+    scores: FloatArray | None = None,
+) -> IntArray:
     """Candidates that most reduce the variance of the surrogate where the limits are decided.
 
     Every limit of every response is a target.  Its neighbourhood is a set of nodes, drawn from the
@@ -294,7 +291,7 @@ def tail_batch(
     scale = np.std(surrogate.values, axis=0)
     limits = predicted_limits(values, exceedances, held)
     # where losses alone exceed the probability, the limit of the samples that hold is the target
-    standing = _weighted_limits(values, np.asarray(exceedances, float), held / held.sum())
+    standing = _quantiles(values, held / held.sum(), np.asarray(exceedances, float))
     limits = np.where(np.isfinite(limits), limits, standing)
 
     targets = [
@@ -314,7 +311,7 @@ def tail_batch(
         for response, nodes in targets
     ]
     variance = deviation[pool].T ** 2  # (response, pool)
-    rows: list[list[Array]] = [[] for _ in scale]
+    rows: list[list[FloatArray]] = [[] for _ in scale]
     free = np.ones(pool.size, dtype=bool)
     chosen = np.empty(n_new, dtype=np.int64)
     for place in range(n_new):
@@ -348,22 +345,14 @@ CRITERIA = {"taylor": taylor_batch, "tail": tail_batch}
 """Criteria by the name they have in a configuration."""
 
 
-def _weighted_limits(values: Array, levels: Array, weight: Array) -> Array:
-    """Smallest value (level, response) beyond which no more than ``levels`` of ``weight`` lies."""
-    limits = np.empty((levels.size, values.shape[1]))
-    for response in range(values.shape[1]):
-        order = np.argsort(values[:, response], kind="stable")
-        ordered = values[order, response]
-        beyond = np.append(np.cumsum(weight[order][:0:-1])[::-1], 0.0)
-        # the tolerance forgives the rounding of the sums, far below one point's share
-        reached = beyond[None, :] <= levels[:, None] + 1e-6 / ordered.size
-        reached &= levels[:, None] >= 0.0
-        first = np.argmax(reached, axis=1)
-        limits[:, response] = np.where(reached.any(axis=1), ordered[first], np.inf)
-    return limits
+def _quantiles(values: FloatArray, weight: FloatArray, beyond: FloatArray) -> FloatArray:
+    """Weighted quantile (level, response) of each response; infinite where none may lie beyond."""
+    rounding = 1e-6 / values.shape[0]  # of the sums, far below one point's share
+    found = [weighted_quantile(one, weight, beyond, rounding) for one in values.T]
+    return np.where(beyond[:, None] >= 0.0, np.column_stack(found), np.inf)
 
 
-def _nodes(excess: Array, deviation: Array, spread: float, held: Array) -> npt.NDArray[np.int64]:
+def _nodes(excess: FloatArray, deviation: FloatArray, spread: float, held: FloatArray) -> IntArray:
     """Candidates (node,) that stand for the neighbourhood of a limit, by systematic sampling."""
     width = np.hypot(deviation, BAND * spread)
     weight = held * np.exp(-0.5 * (excess / width) ** 2) / width
@@ -377,7 +366,7 @@ def _checked(
     candidates: npt.ArrayLike,
     n_new: int,
     held_probability: npt.ArrayLike | None,
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Samples, candidates, their probability to hold and their distance to the nearest sample."""
     n_parameters = surrogate.points.shape[1]
     occupied = checked_points(occupied, n_parameters)
@@ -404,7 +393,7 @@ def _check_aggregate(aggregate: str) -> None:
         raise ValueError(f"aggregate must be one of {', '.join(AGGREGATES)}, got '{aggregate}'")
 
 
-def _diameter(points: Array) -> float:
+def _diameter(points: FloatArray) -> float:
     """Largest distance between two of the points (point, parameter), in blocks of 1024."""
     return max(
         float(cdist(points[start : start + 1024], points[start:]).max())

@@ -14,7 +14,8 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
-from maglev.uncertainty.distributions import FloatArray, Marginals
+from maglev.arrays import FloatArray
+from maglev.uncertainty.distributions import Marginals
 
 COUNTING_POINTS = 2**20
 """Counting points per set: relative counting error below 10 % for a cell of probability 1e-4."""
@@ -141,36 +142,6 @@ def sobol_points(marginals: Marginals, n: int, rng: np.random.Generator) -> Poin
     """
     _check_size(n)
     return _equal_weights(_sobol_unit(marginals.n, n, rng), marginals)
-
-
-def latin_hypercube_points(marginals: Marginals, n: int, rng: np.random.Generator) -> PointSet:
-    """One-stage set of Latin hypercube points of equal weight, random within their strata.
-
-    Parameters
-    ----------
-    marginals
-        The random inputs.
-    n
-        Number of points, two or more.
-    rng
-        Source of the permutations and of the places within the strata.
-
-    Returns
-    -------
-    point_set
-        The points with probability 1/n each.
-
-    Raises
-    ------
-    ValueError
-        If ``n`` is less than two.
-
-    References
-    ----------
-    McKay, Beckman, Conover, Technometrics 21 (1979) 239-245; scipy.stats.qmc.LatinHypercube.
-    """
-    _check_size(n)
-    return _equal_weights(qmc.LatinHypercube(marginals.n, rng=rng).random(n), marginals)
 
 
 def rearranged(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Marginals) -> FloatArray:

@@ -11,8 +11,9 @@ import numpy.typing as npt
 from scipy.linalg import LinAlgError, LinAlgWarning, lu_factor, lu_solve
 from scipy.optimize import minimize, minimize_scalar
 
+from maglev.arrays import FloatArray
 from maglev.uncertainty import _radial_kernels as kernels
-from maglev.uncertainty.surrogate import Array, checked_points, checked_training
+from maglev.uncertainty.surrogate import checked_points, checked_training
 
 BASES = {
     "cubic": kernels.CUBIC,
@@ -59,17 +60,17 @@ class RBF:
         Condition number of A in the 1-norm [-], with Φ over its largest entry.
     """
 
-    points: Array
-    values: Array
+    points: FloatArray
+    values: FloatArray
     basis: str
     shape: float
-    length: Array
-    weights: Array
-    tail: Array
-    inverse_diagonal: Array
+    length: FloatArray
+    weights: FloatArray
+    tail: FloatArray
+    inverse_diagonal: FloatArray
     condition: float
 
-    def predict(self, points: npt.ArrayLike) -> Array:
+    def predict(self, points: npt.ArrayLike) -> FloatArray:
         """Values of the surrogate.
 
         Parameters
@@ -99,7 +100,7 @@ class RBF:
         )
         return values
 
-    def gradient(self, points: npt.ArrayLike) -> Array:
+    def gradient(self, points: npt.ArrayLike) -> FloatArray:
         """Gradient of the surrogate in closed form: Σ_j λ_j (φ′(r_j)/r_j)(u − u_j)/ℓ² + b.
 
         Parameters
@@ -129,7 +130,7 @@ class RBF:
         )
         return gradient / self.length + self.tail[1:].T
 
-    def leave_one_out(self) -> Array:
+    def leave_one_out(self) -> FloatArray:
         """Residual at each training point of the fit made without it, shape and length kept.
 
         e_k = λ_k / (A⁻¹)_kk with the whole saddle matrix A, tail included.
@@ -165,25 +166,25 @@ class ScaledRBF:
         One fit per response, each with its own lengths.
     """
 
-    points: Array
-    values: Array
+    points: FloatArray
+    values: FloatArray
     responses: tuple[RBF, ...]
 
     @property
-    def length(self) -> Array:
+    def length(self) -> FloatArray:
         """Lengths (response, parameter) [-], each row over its geometric mean."""
         length = np.array([response.length for response in self.responses])
         return length / np.exp(np.mean(np.log(length), axis=1, keepdims=True))
 
-    def predict(self, points: npt.ArrayLike) -> Array:
+    def predict(self, points: npt.ArrayLike) -> FloatArray:
         """Values (point, response) of the surrogate; see ``RBF.predict``."""
         return np.concatenate([response.predict(points) for response in self.responses], axis=1)
 
-    def gradient(self, points: npt.ArrayLike) -> Array:
+    def gradient(self, points: npt.ArrayLike) -> FloatArray:
         """Gradients (point, response, parameter) of the surrogate; see ``RBF.gradient``."""
         return np.concatenate([response.gradient(points) for response in self.responses], axis=1)
 
-    def leave_one_out(self) -> Array:
+    def leave_one_out(self) -> FloatArray:
         """Residuals (sample, response), lengths kept; see ``RBF.leave_one_out``."""
         return np.concatenate([response.leave_one_out() for response in self.responses], axis=1)
 
@@ -298,7 +299,9 @@ def fit_scaled_rbf(
     return ScaledRBF(points=points, values=values, responses=tuple(responses))
 
 
-def _saddle_matrix(points: Array, basis: str, shape: float, length: Array) -> tuple[Array, float]:
+def _saddle_matrix(
+    points: FloatArray, basis: str, shape: float, length: FloatArray
+) -> tuple[FloatArray, float]:
     """Whole saddle matrix (sample + 1 + parameter, same) with Φ over its largest entry, and that.
 
     The unit in which r³ is measured then says nothing about the condition number.
@@ -315,7 +318,7 @@ def _saddle_matrix(points: Array, basis: str, shape: float, length: Array) -> tu
     return matrix, size
 
 
-def _inverse(matrix: Array) -> tuple[tuple[Array, Array], Array, float]:
+def _inverse(matrix: FloatArray) -> tuple[tuple[FloatArray, FloatArray], FloatArray, float]:
     """Factorisation, inverse and 1-norm condition number of ``matrix``; infinite if singular."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", LinAlgWarning)
@@ -328,7 +331,9 @@ def _inverse(matrix: Array) -> tuple[tuple[Array, Array], Array, float]:
     return factor, inverse, float(condition)
 
 
-def _solved(points: Array, values: Array, basis: str, shape: float, length: Array) -> RBF:
+def _solved(
+    points: FloatArray, values: FloatArray, basis: str, shape: float, length: FloatArray
+) -> RBF:
     """The surrogate for given shape and lengths."""
     n, s = points.shape
     matrix, size = _saddle_matrix(points, basis, shape, length)
@@ -353,7 +358,9 @@ def _solved(points: Array, values: Array, basis: str, shape: float, length: Arra
     )
 
 
-def _leave_one_out(points: Array, weights: Array, inverse_diagonal: Array) -> Array:
+def _leave_one_out(
+    points: FloatArray, weights: FloatArray, inverse_diagonal: FloatArray
+) -> FloatArray:
     """Residuals e_k = λ_k / (A⁻¹)_kk (sample, response)."""
     n, s = points.shape
     if n < s + 2:
@@ -371,7 +378,9 @@ def _leave_one_out(points: Array, weights: Array, inverse_diagonal: Array) -> Ar
     return weights / inverse_diagonal[:, None]
 
 
-def _shape_by_leave_one_out(points: Array, values: Array, basis: str, length: Array) -> float:
+def _shape_by_leave_one_out(
+    points: FloatArray, values: FloatArray, basis: str, length: FloatArray
+) -> float:
     """Shape parameter with the smallest leave-one-out error over all standardised responses."""
     n, s = points.shape
     scaled = points / length
@@ -410,14 +419,16 @@ def _shape_by_leave_one_out(points: Array, values: Array, basis: str, length: Ar
     return float(np.exp(trial[best]))
 
 
-def _length_by_leave_one_out(points: Array, values: Array, basis: str, starts: Array) -> Array:
+def _length_by_leave_one_out(
+    points: FloatArray, values: FloatArray, basis: str, starts: FloatArray
+) -> FloatArray:
     """Lengths (parameter,) that minimise the leave-one-out error of one response (sample,)."""
     n, s = points.shape
     right = np.concatenate([(values - values.mean()) / values.std(), np.zeros(1 + s)])
     difference = (points[:, None, :] - points[None, :, :]) ** 2
     slope = np.empty((n, n))
 
-    def error(log_length: Array) -> tuple[float, Array]:
+    def error(log_length: FloatArray) -> tuple[float, FloatArray]:
         length = np.exp(log_length)
         matrix, size = _saddle_matrix(points, basis, 1.0, length)
         factor, inverse, condition = _inverse(matrix)

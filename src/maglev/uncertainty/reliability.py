@@ -1,4 +1,4 @@
-"""Probability of exceedance, limits at given failure probabilities, distances of distributions.
+"""Probability of exceedance, limits at given failure probabilities, and their intervals.
 
 A lost sample is a failure for every limit.  Theory: docs/theory/reliability.md.
 """
@@ -11,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.uncertainty.samples import (
-    FloatArray,
     check_lost_probability,
-    effective_size,
+    weight_beyond,
+    weighted_quantile,
     weighted_sample,
 )
+from maglev.vocabulary import GIVEN, INFINITE, TOO_FEW
 
 FAILURE_PROBABILITIES = (1e-1, 1e-2, 1e-3)
 """Levels at which limits are given by default."""
@@ -24,9 +26,6 @@ FAILURE_PROBABILITIES = (1e-1, 1e-2, 1e-3)
 CARRIED = 10
 """Expected exceedances, to the nearest whole number, that a sample needs to carry a level; fewer
 and no number is given."""
-
-GIVEN, BEYOND_SAMPLE, LOST = "given", "beyond the sample", "exceeded by the lost samples"
-"""What can be said of a limit: see ``Limits.status``."""
 
 _ROUNDING = 1e-12  # of a sum of probabilities, so that 1000 samples carry exactly one at 1e-3
 
@@ -47,9 +46,7 @@ class Limits:
     expected_exceedances : (level,)
         Number of held samples expected beyond the limit [-].
     status : (level,)
-        ``"given"``; ``"beyond the sample"`` with fewer than ten expected exceedances; or
-        ``"exceeded by the lost samples"``, where losses alone are likelier than the level and no
-        finite limit exists.
+        A word of `maglev.vocabulary.LIMIT_STATUS`: too few are less than ten expected exceedances.
     confidence
         Confidence of the interval [-]; None with no interval.
     """
@@ -102,56 +99,9 @@ def exceedance(
     values, probability = weighted_sample(values, probability)
     check_lost_probability(lost_probability)
     at = _checked_places(at)
-    order, beyond = _beyond(values, probability)
-    held = beyond[np.searchsorted(values[order], at, side="right")]
+    ordered, beyond = weight_beyond(values, probability)
+    held = beyond[np.searchsorted(ordered, at, side="right")]
     return lost_probability + (1.0 - lost_probability) * held
-
-
-def density_exceedance(
-    at: npt.ArrayLike, cell_centre: npt.ArrayLike, density: npt.ArrayLike
-) -> FloatArray:
-    """Probability of exceedance from a density given as cell means.
-
-    ``POE(y) = 1 - integral of p up to y``; what the density lacks of one is the lost probability
-    and so counts as exceeded everywhere.
-
-    Parameters
-    ----------
-    at : (place,)
-        Values y [unit of the extreme value].
-    cell_centre : (cell,)
-        Centres of cells of equal width [unit], ascending.
-    density : (cell,)
-        Mean density in each cell [1/unit].
-
-    Returns
-    -------
-    exceedance : (place,)
-        P(Y > y or lost) [-].
-
-    Raises
-    ------
-    ValueError
-        If shapes disagree, the cells are not of equal width, a density is negative or not finite,
-        or it integrates to more than one.
-
-    References
-    ----------
-    docs/theory/reliability.md, eq. (3).
-    """
-    at = _checked_places(at)
-    cell_centre, density = _checked_density(cell_centre, density)
-    width = np.diff(cell_centre)
-    mesh = float(width.mean())
-    if not np.allclose(width, mesh, rtol=1e-6, atol=0.0):
-        raise ValueError(
-            f"cells must have one width, got {width.min()} to {width.max()}; interpolate first"
-        )
-    below = np.concatenate(([0.0], np.cumsum(density) * mesh))
-    if below[-1] > 1.0 + 1e-9:
-        raise ValueError(f"a density must integrate to 1 or less, got {below[-1]}")
-    faces = cell_centre[0] + mesh * (np.arange(density.size + 1) - 0.5)
-    return 1.0 - np.interp(at, faces, below)
 
 
 def sample_limits(
@@ -214,62 +164,6 @@ def sample_limits(
         expected_exceedances=np.maximum(expected, 0.0),
         status=status,
         confidence=confidence,
-    )
-
-
-def weighted_limits(
-    values: npt.ArrayLike,
-    probability: npt.ArrayLike,
-    failure_probability: npt.ArrayLike = FAILURE_PROBABILITIES,
-    *,
-    lost_probability: float = 0.0,
-) -> Limits:
-    """Limits of samples with assigned probabilities, off the exact weighted distribution.
-
-    A point set is designed, not drawn, so it has no binomial interval and none is given.  The
-    expected exceedances are those of its effective size ``1 / sum(P^2)``.
-
-    Parameters
-    ----------
-    values : (sample,)
-        Extreme values of the held samples [their unit].
-    probability : (sample,)
-        Their probabilities given that they are held [-].
-    failure_probability : (level,)
-        Failure probabilities [-].
-    lost_probability
-        Probability of the samples that are lost [-].
-
-    Returns
-    -------
-    limits
-        One limit per level, without intervals.
-
-    Raises
-    ------
-    ValueError
-        If the sample is faulty, a level lies outside (0, 1) or ``lost_probability`` outside
-        [0, 1).
-
-    References
-    ----------
-    docs/theory/reliability.md, eq. (4).
-    """
-    values, probability = weighted_sample(values, probability)
-    levels = _checked_levels(failure_probability)
-    check_lost_probability(lost_probability)
-    held_level = (levels - lost_probability) / (1.0 - lost_probability)
-    expected = effective_size(probability) * held_level
-    status = _status(expected, lost=held_level <= 0.0)
-    given = np.array(status) == GIVEN
-    return Limits(
-        failure_probability=levels,
-        limit=np.where(given, _quantile(values, probability, held_level), np.nan),
-        lower=None,
-        upper=None,
-        expected_exceedances=np.maximum(expected, 0.0),
-        status=status,
-        confidence=None,
     )
 
 
@@ -385,7 +279,7 @@ def surrogate_limits(
 
     return Limits(
         failure_probability=levels,
-        limit=np.where(given, _quantile(predictions, probability, held_level), np.nan),
+        limit=np.where(given, weighted_quantile(predictions, probability, held_level), np.nan),
         lower=end(low, fewest, 0),
         upper=end(high, most, 1),
         expected_exceedances=np.maximum(n * held_level, 0.0),
@@ -454,169 +348,37 @@ def error_range_near(
     return residuals[near].min(axis=1), residuals[near].max(axis=1)
 
 
-def kolmogorov_distance(
-    values_a: npt.ArrayLike,
-    values_b: npt.ArrayLike,
-    probability_a: npt.ArrayLike | None = None,
-    probability_b: npt.ArrayLike | None = None,
-) -> float:
-    """Largest difference of two weighted distribution functions.
+def binomial_interval(
+    n_beyond: FloatArray | float, n: int, confidence: float
+) -> tuple[FloatArray, FloatArray]:
+    """Exact interval of a probability of which ``n_beyond`` of ``n`` samples speak.
 
     Parameters
     ----------
-    values_a, values_b : (sample,)
-        Values of the two samples [the same unit].
-    probability_a, probability_b : (sample,), optional
-        Their probabilities [-]; equal if not given.
-
-    Returns
-    -------
-    distance
-        ``sup_y |F_a(y) - F_b(y)|`` [-], between 0 and 1.
-
-    Raises
-    ------
-    ValueError
-        If a sample is faulty.
-
-    References
-    ----------
-    docs/theory/reliability.md, eq. (10).
-    """
-    both = np.concatenate((np.asarray(values_a, dtype=float), np.asarray(values_b, dtype=float)))
-    a = exceedance(both, values_a, probability_a)
-    b = exceedance(both, values_b, probability_b)
-    return float(np.abs(a - b).max())
-
-
-def kolmogorov_noise(n_a: int, n_b: int, confidence: float = 0.95) -> float:
-    """Kolmogorov distance that two samples of one distribution stay below, for large samples.
-
-    Parameters
-    ----------
-    n_a, n_b
-        Numbers of independent, equally weighted samples.
+    n_beyond : (...)
+        Numbers of samples.
+    n
+        Number of all.
     confidence
-        Probability that the distance stays below [-].
+        Two-sided confidence [-].
 
     Returns
     -------
-    distance
-        Quantile of the distance [-]; no comparison of the two samples can be finer.
-
-    Raises
-    ------
-    ValueError
-        If a number is not positive or the confidence lies outside (0, 1).
+    low, high : (...)
+        Ends of the interval [-].
 
     References
     ----------
-    Smirnov, Ann. Math. Stat. 19 (1948) 279-281; scipy.stats.kstwobign.
+    Clopper, Pearson, Biometrika 26 (1934) 404-413.
     """
-    if n_a < 1 or n_b < 1:
-        raise ValueError(f"sample sizes must be positive, got {n_a} and {n_b}")
-    _check_confidence(confidence)
-    return float(stats.kstwobign.ppf(confidence) * np.sqrt(1.0 / n_a + 1.0 / n_b))
+    k = np.asarray(n_beyond, dtype=float)
+    outside = 0.5 * (1.0 - confidence)
+    low = np.where(k > 0, stats.beta.ppf(outside, np.maximum(k, 1), n - k + 1), 0.0)
+    high = np.where(k < n, stats.beta.ppf(1.0 - outside, k + 1, np.maximum(n - k, 1)), 1.0)
+    return low, high
 
 
-def wasserstein_distance(
-    values_a: npt.ArrayLike,
-    values_b: npt.ArrayLike,
-    probability_a: npt.ArrayLike | None = None,
-    probability_b: npt.ArrayLike | None = None,
-) -> float:
-    """Mean distance that probability has to be moved from one sample to become the other.
-
-    Parameters
-    ----------
-    values_a, values_b : (sample,)
-        Values of the two samples [the same unit].
-    probability_a, probability_b : (sample,), optional
-        Their probabilities [-]; equal if not given.
-
-    Returns
-    -------
-    distance
-        ``integral |F_a - F_b| dy`` [unit of the values].
-
-    Raises
-    ------
-    ValueError
-        If a sample is faulty.
-
-    References
-    ----------
-    scipy.stats.wasserstein_distance; docs/theory/reliability.md, eq. (11).
-    """
-    values_a, probability_a = weighted_sample(values_a, probability_a)
-    values_b, probability_b = weighted_sample(values_b, probability_b)
-    return float(stats.wasserstein_distance(values_a, values_b, probability_a, probability_b))
-
-
-def density_distance(
-    at_a: npt.ArrayLike, density_a: npt.ArrayLike, at_b: npt.ArrayLike, density_b: npt.ArrayLike
-) -> float:
-    """Integral of the absolute difference of two densities (L1).
-
-    Each density is a straight line between its own places and zero outside them; the integral is
-    exact for that.
-
-    Parameters
-    ----------
-    at_a, at_b : (place,)
-        Places, ascending, of either density [the same unit].
-    density_a, density_b : (place,)
-        The densities there [1/unit].
-
-    Returns
-    -------
-    distance
-        ``integral |p_a - p_b| dy`` [-], between 0 and 2.
-
-    Raises
-    ------
-    ValueError
-        If shapes disagree, places do not ascend, or a density is negative or not finite.
-
-    References
-    ----------
-    docs/theory/reliability.md, eq. (12).
-    """
-    at_a, density_a = _checked_density(at_a, density_a)
-    at_b, density_b = _checked_density(at_b, density_b)
-    places = np.union1d(at_a, at_b)
-    left = np.zeros(places.size - 1)
-    right = np.zeros(places.size - 1)
-    for at, density, sign in ((at_a, density_a, 1.0), (at_b, density_b, -1.0)):
-        inside = (places[:-1] >= at[0]) & (places[1:] <= at[-1])
-        here = np.interp(places, at, density)
-        left += sign * here[:-1] * inside
-        right += sign * here[1:] * inside
-    a, b = np.abs(left), np.abs(right)
-    crossing = left * right < 0.0
-    mean = 0.5 * (a + b)
-    mean[crossing] = 0.5 * (a[crossing] ** 2 + b[crossing] ** 2) / (a[crossing] + b[crossing])
-    return float(mean @ np.diff(places))
-
-
-def _beyond(values: FloatArray, probability: FloatArray) -> tuple[npt.NDArray[np.intp], FloatArray]:
-    """Ascending order of the values, and the probability left beyond the first k of them."""
-    order = np.argsort(values, kind="stable")
-    beyond = np.append(np.cumsum(probability[order][::-1])[::-1], 0.0)
-    return order, beyond
-
-
-def _quantile(values: FloatArray, probability: FloatArray, levels: FloatArray) -> FloatArray:
-    """Smallest value whose exceedance is at most each level; the largest where that is negative."""
-    order, beyond = _beyond(values, probability)
-    # beyond[k + 1] is the exceedance of the k-th smallest value and does not grow with k
-    place = np.searchsorted(-beyond[1:], -(levels + _ROUNDING), side="left")
-    return values[order][np.minimum(place, values.size - 1)]
-
-
-def _order_statistics(
-    n: int, quantile: FloatArray, confidence: float
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _order_statistics(n: int, quantile: FloatArray, confidence: float) -> tuple[IntArray, IntArray]:
     """Ranks, 0 to n + 1, of the order statistics that hold a quantile with the confidence."""
     outside = 0.5 * (1.0 - confidence)
     first = stats.binom.ppf(outside, n, quantile).astype(np.int64)
@@ -647,9 +409,9 @@ def _fewest_residuals(confidence: float) -> int:
     return int(np.ceil(2.0 / (1.0 - confidence) * (1.0 - _ROUNDING))) - 1
 
 
-def _status(expected: FloatArray, lost: npt.NDArray[np.bool_]) -> tuple[str, ...]:
+def _status(expected: FloatArray, lost: BoolArray) -> tuple[str, ...]:
     return tuple(
-        LOST if none_finite else GIVEN if round(count) >= CARRIED else BEYOND_SAMPLE
+        INFINITE if none_finite else GIVEN if round(count) >= CARRIED else TOO_FEW
         for count, none_finite in zip(expected, lost, strict=True)
     )
 
@@ -666,20 +428,6 @@ def _checked_places(at: npt.ArrayLike) -> FloatArray:
     if at.ndim != 1 or np.any(np.isnan(at)):
         raise ValueError(f"places must have shape (place,) and not be NaN, got shape {at.shape}")
     return at
-
-
-def _checked_density(at: npt.ArrayLike, density: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    at, density = np.asarray(at, dtype=float), np.asarray(density, dtype=float)
-    if at.ndim != 1 or at.size < 2 or density.shape != at.shape:
-        raise ValueError(
-            f"places and densities have shapes {at.shape} and {density.shape}, expected (place,) "
-            "twice, with two places or more"
-        )
-    if not (np.all(np.isfinite(at)) and np.all(np.diff(at) > 0.0)):
-        raise ValueError("places of a density must be finite and ascend")
-    if not np.all(np.isfinite(density) & (density >= 0.0)):
-        raise ValueError("densities must be finite and zero or positive")
-    return at, density
 
 
 def _check_confidence(confidence: float) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from maglev.arrays import FloatArray
 
 SUM_TOLERANCE = 1e-9
 """How far probabilities may sum from one: far above rounding, far below one point's. Assumed."""
@@ -196,3 +196,51 @@ def effective_size(probability: npt.ArrayLike) -> float:
     Kish, Survey Sampling (1965), sec. 11.7.
     """
     return float(1.0 / np.sum(np.square(np.asarray(probability, dtype=float))))
+
+
+def weight_beyond(values: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Values in ascending order, and the weight left beyond the first k of them.
+
+    Parameters
+    ----------
+    values : (sample,)
+        Values [their unit].
+    weight : (sample,)
+        Their weights [-].
+
+    Returns
+    -------
+    ordered : (sample,)
+        The values.
+    beyond : (sample + 1,)
+        Weight beyond the first k, for k from none to all.
+    """
+    order = np.argsort(values, kind="stable")
+    return values[order], np.append(np.cumsum(weight[order][::-1])[::-1], 0.0)
+
+
+def weighted_quantile(
+    values: npt.ArrayLike, weight: npt.ArrayLike, beyond: npt.ArrayLike, rounding: float = 1e-12
+) -> FloatArray:
+    """Smallest value beyond which no more than a given weight lies.
+
+    Parameters
+    ----------
+    values : (sample,)
+        Values [their unit].
+    weight : (sample,)
+        Their weights [-]; they need not sum to one.
+    beyond : (level,)
+        Weights that may lie beyond [-]; below zero, the largest value is given.
+    rounding
+        Error of a sum of weights that is forgiven [-], far below one weight.
+
+    Returns
+    -------
+    quantile : (level,)
+        Values of the sample.
+    """
+    ordered, left = weight_beyond(np.asarray(values, float), np.asarray(weight, float))
+    # left[k + 1] lies beyond the k-th smallest value and does not grow with k
+    place = np.searchsorted(-left[1:], -(np.asarray(beyond, float) + rounding), side="left")
+    return ordered[np.minimum(place, ordered.size - 1)]

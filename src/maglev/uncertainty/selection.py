@@ -11,14 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from maglev.arrays import FloatArray, IntArray
 from maglev.uncertainty.kriging import Kriging, conditioned_kriging, fit_kriging
 from maglev.uncertainty.rbf import RBF, ScaledRBF, fit_rbf, fit_scaled_rbf
-from maglev.uncertainty.surrogate import Array, best_by_leave_one_out, checked_training
+from maglev.uncertainty.surrogate import best_by_leave_one_out, checked_training
+from maglev.vocabulary import SURROGATES
 
-KINDS = ("rbf", "scaled_rbf", "kriging")
-"""Kinds of surrogates, by the name they have in a configuration."""
-
-CHOICES = (*KINDS, "best")
+CHOICES = (*SURROGATES, "best")
 """What can be asked for: one kind for all responses, or the best of all for each."""
 
 _FITS = {"rbf": fit_rbf, "scaled_rbf": fit_scaled_rbf, "kriging": fit_kriging}
@@ -35,7 +34,7 @@ class Selected:
     values : (sample, response)
         Training values [unit of the response].
     kinds : (response,)
-        One of ``KINDS`` for each response.
+        One of `maglev.vocabulary.SURROGATES` for each response.
     length : (response, parameter)
         Length of each input [-]; ones for ``"rbf"``, over their geometric mean for
         ``"scaled_rbf"``.
@@ -45,35 +44,35 @@ class Selected:
         For each kind that occurs, the numbers of its responses and their surrogate.
     """
 
-    points: Array
-    values: Array
+    points: FloatArray
+    values: FloatArray
     kinds: tuple[str, ...]
-    length: Array
-    amplitude: Array
-    parts: tuple[tuple[npt.NDArray[np.int64], RBF | ScaledRBF | Kriging], ...]
+    length: FloatArray
+    amplitude: FloatArray
+    parts: tuple[tuple[IntArray, RBF | ScaledRBF | Kriging], ...]
 
-    def predict(self, points: npt.ArrayLike) -> Array:
+    def predict(self, points: npt.ArrayLike) -> FloatArray:
         """Values (point, response) at standardised ``points`` (point, parameter)."""
         values = np.empty((len(np.asarray(points)), len(self.kinds)))
         for responses, surrogate in self.parts:
             values[:, responses] = surrogate.predict(points)
         return values
 
-    def gradient(self, points: npt.ArrayLike) -> Array:
+    def gradient(self, points: npt.ArrayLike) -> FloatArray:
         """Gradients (point, response, parameter) at ``points`` (point, parameter)."""
         gradient = np.empty((len(np.asarray(points)), len(self.kinds), self.points.shape[1]))
         for responses, surrogate in self.parts:
             gradient[:, responses] = surrogate.gradient(points)
         return gradient
 
-    def leave_one_out(self) -> Array:
+    def leave_one_out(self) -> FloatArray:
         """Residuals (sample, response): value less the prediction made without that sample."""
         residuals = np.empty_like(self.values)
         for responses, surrogate in self.parts:
             residuals[:, responses] = surrogate.leave_one_out()
         return residuals
 
-    def standard_deviation(self, points: npt.ArrayLike) -> Array:
+    def standard_deviation(self, points: npt.ArrayLike) -> FloatArray:
         """Posterior deviations (point, response) of Kriging; NaN for radial basis functions."""
         deviation = np.full((len(np.asarray(points)), len(self.kinds)), np.nan)
         for responses, surrogate in self.parts:
@@ -113,14 +112,14 @@ def fit_selected(points: npt.ArrayLike, values: npt.ArrayLike, choice: str) -> S
         raise ValueError(f"surrogate must be one of {', '.join(CHOICES)}, got '{choice}'")
     points, values = checked_training(points, values)
     fitted: dict[str, RBF | ScaledRBF | Kriging] = {}
-    for kind in KINDS if choice == "best" else (choice,):
+    for kind in SURROGATES if choice == "best" else (choice,):
         try:
             fitted[kind] = _FITS[kind](points, values)
             if choice == "best":
                 fitted[kind].leave_one_out()
         except ValueError:
             fitted.pop(kind, None)
-            if choice != "best" or (kind == KINDS[-1] and not fitted):
+            if choice != "best" or (kind == SURROGATES[-1] and not fitted):
                 raise
     kinds = best_by_leave_one_out(fitted) if len(fitted) > 1 else (*fitted,) * values.shape[1]
     length = np.ones((values.shape[1], points.shape[1]))
@@ -161,17 +160,17 @@ def rebuilt(
     points, values = checked_training(points, values)
     length, amplitude = np.array(length, dtype=float), np.array(amplitude, dtype=float)
     n_responses = values.shape[1]
-    if len(kinds) != n_responses or not set(kinds) <= set(KINDS):
+    if len(kinds) != n_responses or not set(kinds) <= set(SURROGATES):
         raise ValueError(
-            f"kinds must be {n_responses} of {', '.join(KINDS)}, one per response, got {kinds}"
+            f"kinds must be {n_responses} of {', '.join(SURROGATES)}, one per response, got {kinds}"
         )
     if length.shape != (n_responses, points.shape[1]) or amplitude.shape != (n_responses,):
         raise ValueError(
             f"lengths and amplitudes have shapes {length.shape} and {amplitude.shape}, expected "
             f"(response, parameter) = ({n_responses}, {points.shape[1]}) and ({n_responses},)"
         )
-    parts: list[tuple[npt.NDArray[np.int64], RBF | ScaledRBF | Kriging]] = []
-    for kind in KINDS:
+    parts: list[tuple[IntArray, RBF | ScaledRBF | Kriging]] = []
+    for kind in SURROGATES:
         responses = np.flatnonzero([one == kind for one in kinds])
         if not responses.size:
             continue

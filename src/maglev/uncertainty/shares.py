@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import bootstrap
 
-from maglev.uncertainty.samples import FloatArray
+from maglev.arrays import FloatArray, IntArray
 
 N_RESAMPLES = 999
 """Bootstrap samples behind an interval; assumed, SciPy's own choice for such intervals."""
@@ -82,7 +82,7 @@ def pick_freeze_shares(
         raise ValueError(f"confidence must lie in (0, 1), got {confidence}")
     runs = (runs - runs[0].mean()) / runs[0].std()  # no cancellation
 
-    def shares(chosen: npt.NDArray[np.int64], axis: int = -1) -> FloatArray:
+    def shares(chosen: IntArray, axis: int = -1) -> FloatArray:
         both = [_share(runs[0][chosen], runs[k][chosen], axis) for k in (1, 2)]
         return np.array([*both, 1.0 - both[0] - both[1]])
 

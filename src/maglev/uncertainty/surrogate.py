@@ -9,44 +9,44 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from maglev.arrays import FloatArray
 
 
 class Surrogate(Protocol):
     """A fitted surrogate of several responses."""
 
     @property
-    def points(self) -> Array:
+    def points(self) -> FloatArray:
         """Training points (sample, parameter) [-], standardised."""
 
     @property
-    def values(self) -> Array:
+    def values(self) -> FloatArray:
         """Training values (sample, response) [unit of the response]."""
 
-    def predict(self, points: npt.ArrayLike) -> Array:
+    def predict(self, points: npt.ArrayLike) -> FloatArray:
         """Values (point, response) at ``points`` (point, parameter)."""
 
-    def gradient(self, points: npt.ArrayLike) -> Array:
+    def gradient(self, points: npt.ArrayLike) -> FloatArray:
         """Gradients (point, response, parameter) at ``points`` (point, parameter)."""
 
-    def leave_one_out(self) -> Array:
+    def leave_one_out(self) -> FloatArray:
         """Residuals (sample, response): value less the prediction made without that sample."""
 
 
 class SurrogateWithDeviation(Surrogate, Protocol):
     """A surrogate that knows how uncertain it is."""
 
-    def standard_deviation(self, points: npt.ArrayLike) -> Array:
+    def standard_deviation(self, points: npt.ArrayLike) -> FloatArray:
         """Standard deviations (point, response) at ``points`` (point, parameter)."""
 
-    def covariance(self, response: int, rows: npt.ArrayLike, columns: npt.ArrayLike) -> Array:
+    def covariance(self, response: int, rows: npt.ArrayLike, columns: npt.ArrayLike) -> FloatArray:
         """Covariance (row, column) of one response between two sets of points."""
 
 
-Fit = Callable[[Array, Array], Surrogate]
+Fit = Callable[[FloatArray, FloatArray], Surrogate]
 
 
-def checked_points(points: npt.ArrayLike, n_parameters: int | None = None) -> Array:
+def checked_points(points: npt.ArrayLike, n_parameters: int | None = None) -> FloatArray:
     """Points as a contiguous array of floats, after a look at their shape and their values.
 
     Parameters
@@ -82,7 +82,7 @@ def checked_points(points: npt.ArrayLike, n_parameters: int | None = None) -> Ar
     return array
 
 
-def checked_training(points: npt.ArrayLike, values: npt.ArrayLike) -> tuple[Array, Array]:
+def checked_training(points: npt.ArrayLike, values: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Training data as arrays, after a look at everything a surrogate cannot do without.
 
     Parameters
@@ -149,7 +149,7 @@ def checked_training(points: npt.ArrayLike, values: npt.ArrayLike) -> tuple[Arra
     return points, values
 
 
-def relative_error(surrogate: Surrogate) -> Array:
+def relative_error(surrogate: Surrogate) -> FloatArray:
     """Root mean square of the leave-one-out residuals over the deviation of the response.
 
     Parameters

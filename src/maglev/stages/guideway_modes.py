@@ -10,6 +10,7 @@ from maglev.mechanics import guideway
 from maglev.mechanics.guideway import RIGHT
 from maglev.mechanics.moving_load import Beam
 from maglev.parameters import Config
+from maglev.stage import Stage
 
 _CUTOFF = 45.0  # highest mode in the file [Hz], above the second vertical bending of a span
 _POINTS_PER_SPAN = 48  # of the shapes
@@ -89,3 +90,12 @@ def dataset(config: Config) -> xr.Dataset:
         "confidence": measured.confidence,
     }
     return dataset
+
+
+STAGE = Stage(
+    name="guideway_modes",
+    of="run",
+    reads=("guideway", "validation.measurements"),
+    layout="modes",
+    compute=dataset,
+)

@@ -1,0 +1,15 @@
+"""Types of the arrays that the package hands around."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+"""Real numbers."""
+
+IntArray = npt.NDArray[np.int64]
+"""Whole numbers."""
+
+BoolArray = npt.NDArray[np.bool_]
+"""Yes or no."""

@@ -1,0 +1,368 @@
+"""How a stage declares itself, and the view of the configuration that it computes with.
+
+A stage is one frozen value, ``STAGE``, in a module of `maglev.stages` of the same name.  Its
+command, its rule, its part of the configuration, the attributes of its file, its fingerprint and
+its page in the documentation follow from it.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from inspect import getattr_static
+from pathlib import Path
+from types import FunctionType, MethodType
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+from maglev.config import named_files
+from maglev.fingerprint import code_of, file_hash
+from maglev.parameters import Config, Parameters
+from maglev.vocabulary import BASELINE, METHODS, Method
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_FOLDER = Path(__file__).parent / "stages"
+
+EVERY_STAGE = ("demonstration",)
+"""Keys that every stage reads: its file says whether it is a demonstration."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """One role that files play for a stage; its name is that of the stage that makes them.
+
+    Parameters
+    ----------
+    layout
+        A key of `maglev.datasets.LAYOUTS`.
+    by
+        Names that tell several files of the role apart, such as ``("method",)``: the stage is
+        then given a mapping by such a name, or by tuples of names.  Empty for one file.
+    methods
+        Methods for which a stage of a method is given the role.
+    optional
+        Whether the stage also works without the file.
+    """
+
+    layout: str
+    by: tuple[str, ...] = ()
+    methods: tuple[Method, ...] = METHODS
+    optional: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """What a stage is, beside its pure function.
+
+    Parameters
+    ----------
+    name
+        Name of its module, its rule and, with dashes, its command.
+    of
+        Whether there is one file of a run, of each case, or of each case and method.
+    reads
+        Dotted keys of the configuration, sections whole; ``{case}`` and ``{method}`` stand for
+        the case and the method.  `EVERY_STAGE` is read besides.
+    inputs
+        Files by their role.
+    layout
+        A key of `maglev.datasets.LAYOUTS`: what its file holds.
+    compute
+        The function.  It is given the view of the configuration, then by name all of ``takes``
+        and ``inputs`` that there are, and returns the dataset.
+    takes
+        What it is given besides, with its type: ``case``, ``method``, ``store`` (folder in which
+        runs are kept), ``n_threads``, or any other name, which is a wildcard of its rule.
+    methods
+        Methods for which its file is made; of a stage of a case, of which the case needs one.
+    table
+        From the described dataset to rows and text of a table that is written beside the file as
+        CSV and Markdown.
+    """
+
+    name: str
+    of: Literal["run", "case", "method"]
+    reads: tuple[str, ...]
+    layout: str
+    compute: Callable[..., xr.Dataset]
+    inputs: Mapping[str, Input] = field(default_factory=dict)
+    takes: Mapping[str, type] = field(default_factory=dict)
+    methods: tuple[Method, ...] = METHODS
+    table: Callable[[xr.Dataset], tuple[list[dict[str, object]], str]] | None = None
+
+    @property
+    def command(self) -> str:
+        """Its name on the command line."""
+        return self.name.replace("_", "-")
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """Names of the options of its command, in order; see `flag`."""
+        of = {"run": (), "case": ("case",), "method": ("case", "method")}[self.of]
+        others = (name for name in self.takes if name not in of)
+        return ("config", *of, *self.inputs, *others, "out")
+
+    @property
+    def reads_of(self) -> Literal["run", "case", "method"]:
+        """Whether what it reads is the same in a run, in each case, or for each method."""
+        names = [name for name in ("method", "case") if any(f"{{{name}}}" in r for r in self.reads)]
+        return cast(Literal["run", "case", "method"], names[0] if names else "run")
+
+    def roles(self, method: str | None = None) -> dict[str, Input]:
+        """Its inputs, of a method those that the method has."""
+        return {
+            role: one
+            for role, one in self.inputs.items()
+            if method is None or method in one.methods
+        }
+
+    def keys(self, case: str | None = None, method: str | None = None) -> tuple[str, ...]:
+        """Dotted keys that it reads, with the names of case and method.
+
+        Raises
+        ------
+        ValueError
+            If it needs a case or a method that is not named.
+        """
+        for name, given in (("case", case), ("method", method)):
+            if given is None and any(f"{{{name}}}" in one for one in self.reads):
+                raise ValueError(f"{self.name}: which {name} must be said, got none")
+        return tuple(one.format(case=case, method=method) for one in (*EVERY_STAGE, *self.reads))
+
+    def slice(
+        self, config: Config, case: str | None = None, method: str | None = None
+    ) -> dict[str, Any]:
+        """The part of a configuration that the stage reads, as a configuration file holds it.
+
+        Parameters
+        ----------
+        config
+            The whole configuration.
+        case, method
+            Names of the case and the method, where what it reads depends on them.
+
+        Returns
+        -------
+        part
+            Of a stage that reads its case: without the other cases, the guideway with the spans of
+            the case; its methods are the one method.
+        """
+        whole = config.quantities()
+        part = _chosen(whole, self.keys(case, method))
+        if self.reads_of != "run":
+            assert case is not None  # keys has asked for it
+            own = {"methods": [method or BASELINE], **part.get("cases", {}).get(case, {})}
+            part["cases"] = {**dict.fromkeys(whole["cases"]), case: own}
+            if "guideway" in part:
+                n_spans = whole["cases"][case]["n_spans"]
+                part["guideway"] = {**part["guideway"], "n_spans": n_spans}
+        return part
+
+    def files(
+        self, config: Config, case: str | None = None, method: str | None = None
+    ) -> dict[str, str]:
+        """Files that the part of the configuration names, by the last word of their key."""
+        part = self.slice(config, case, method)
+        return {keys[-1].removesuffix("_file"): name for keys, name in named_files(part)}
+
+    def view(self, config: Config, case: str | None = None, method: str | None = None) -> Config:
+        """The configuration as the stage may read it: any other key is refused.
+
+        Raises
+        ------
+        ValueError
+            If there is no such case, or the stage makes nothing for the method.
+        """
+        if self.of == "method" and method not in self.methods:
+            raise ValueError(f"{self.name} needs a method of {', '.join(self.methods)}: {method}")
+        if self.reads_of != "run" and case not in config.cases:
+            raise ValueError(f"there is no case '{case}', known are: {', '.join(config.cases)}")
+        hashes = {name: file_hash(path) for name, path in self.files(config, case, method).items()}
+        keys = self.keys(case, method)
+        return cast(Config, View(self.name, config, keys, files=tuple(sorted(hashes.items()))))
+
+    def write(
+        self,
+        dataset: xr.Dataset,
+        path: str | Path,
+        config: Config,
+        inputs: Mapping[str, str | Path] | None = None,
+        *,
+        case: str | None = None,
+        method: str | None = None,
+    ) -> None:
+        """Write the stage's dataset with all that explains it.
+
+        Parameters
+        ----------
+        dataset
+            What the stage has computed.
+        path
+            File to write.
+        config
+            What it was computed from.
+        inputs
+            Files it was computed from, by their role.
+        case, method
+            Names of the case and the method it belongs to, if it belongs to one.
+
+        Raises
+        ------
+        ValueError
+            If the dataset is not what the stage's layout says.
+        """
+        from maglev import datasets
+
+        names = {"case": case, "method": method}
+        datasets.write(
+            dataset.assign_attrs({key: name for key, name in names.items() if name is not None}),
+            path,
+            self.layout,
+            config=self.slice(config, case, method),
+            code=code_of(f"stages.{self.name}"),
+            inputs={**self.files(config, case, method), **(inputs or {})},
+        )
+
+
+class UndeclaredKeyError(LookupError):
+    """A stage has read a key of the configuration that its declaration does not name."""
+
+
+class View:
+    """A section of the configuration that answers only for the keys that a stage has declared.
+
+    It serves in place of the section: methods and properties of the section see the view.  Two
+    views are equal if all they can be asked for is equal, files that it names by their bytes.
+
+    Parameters
+    ----------
+    stage
+        Name of the stage.
+    section
+        The configuration or a part of it.
+    reads
+        Dotted keys inside the section that may be read.
+    place
+        Dotted place of the section in the configuration, with a dot behind it.
+    files
+        Hashes of the files that are named in it.
+    """
+
+    def __init__(
+        self,
+        stage: str,
+        section: Parameters | Mapping[str, Any],
+        reads: tuple[str, ...],
+        place: str = "",
+        files: tuple[tuple[str, str], ...] = (),
+    ) -> None:
+        self._stage, self._section, self._reads = stage, section, reads
+        self._place, self._files = place, files
+
+    def _read(self, name: str) -> Any:
+        is_mapping = isinstance(self._section, Mapping)
+        value = self._section[name] if is_mapping else getattr(self._section, name)
+        if name in self._reads:
+            return value
+        prefix = f"{name}."
+        inside = tuple(one.removeprefix(prefix) for one in self._reads if one.startswith(prefix))
+        if not inside:
+            raise UndeclaredKeyError(
+                f"the stage '{self._stage}' reads {self._place}{name}, which it has not declared; "
+                f"add it to 'reads' of STAGE in maglev/stages/{self._stage}.py"
+            )
+        return View(self._stage, value, inside, f"{self._place}{prefix}")
+
+    def __getattr__(self, name: str) -> Any:
+        section = self.__dict__.get("_section")
+        kind = type(section)
+        if isinstance(section, Parameters):
+            if name in kind.model_fields:
+                return self._read(name)
+            found = getattr_static(kind, name, None)
+            if isinstance(found, property) and found.fget is not None:
+                return found.fget(self)
+            if isinstance(found, FunctionType) and not name.startswith("_"):
+                return MethodType(found, self)
+        raise AttributeError(f"{kind.__name__} has no '{name}'")
+
+    def __getitem__(self, name: str) -> Any:
+        return self._read(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict.fromkeys(one.split(".")[0] for one in self._reads))
+
+    def __contains__(self, name: object) -> bool:
+        return name in set(self)
+
+    def model_copy(self, *, update: Mapping[str, Any]) -> View:
+        """The same view of a section with other values of some keys, which it must have read."""
+        for name in update:
+            self._read(name)
+        assert isinstance(self._section, Parameters)
+        changed = self._section.model_copy(update=update)
+        return View(self._stage, changed, self._reads, self._place, self._files)
+
+    def quantities(self) -> dict[str, Any]:
+        """What can be read, as the configuration file would write it, units included."""
+        assert isinstance(self._section, Parameters)
+        return _chosen(self._section.quantities(), self._reads)
+
+    def _key(self) -> tuple[object, ...]:
+        return (json.dumps(self.quantities(), sort_keys=True), self._files)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, View) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+
+def _chosen(whole: Mapping[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
+    """The values at dotted keys of nested mappings, nested likewise."""
+    part: dict[str, Any] = {}
+    for dotted in keys:
+        *outer, last = dotted.split(".")
+        source, target = whole, part
+        for key in outer:
+            source, target = source[key], target.setdefault(key, {})
+        target[last] = source[last]
+    return part
+
+
+def flag(name: str) -> str:
+    """An option as it stands on the command line, such as ``--threads`` for ``n_threads``."""
+    return f"--{name.removeprefix('n_').replace('_', '-')}"
+
+
+def _declares(tree: ast.Module) -> bool:
+    return any(
+        isinstance(node, ast.Assign)
+        and any(isinstance(target, ast.Name) and target.id == "STAGE" for target in node.targets)
+        for node in tree.body
+    )
+
+
+def summaries() -> dict[str, str]:
+    """What each stage does, by its name: the first line of its module, which is not imported."""
+    found = {}
+    for path in sorted(_FOLDER.glob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        if _declares(tree):
+            found[path.stem] = (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
+    return found
+
+
+def named(name: str) -> Stage:
+    """The stage of a name."""
+    stage: Stage = import_module(f"maglev.stages.{name}").STAGE
+    return stage
+
+
+def stages() -> dict[str, Stage]:
+    """All stages by their names; this imports what any of them needs."""
+    return {name: named(name) for name in summaries()}

@@ -1,0 +1,74 @@
+"""Some runs of the baseline of a case, but for those that the store holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from maglev.parameters import Config
+from maglev.stage import Stage
+from maglev.stages.points import baseline, case_of, track_seeds
+from maglev.stages.reads import RUNS_OF_CASE
+from maglev.stages.runs import runs
+from maglev.vocabulary import BASELINE
+
+
+def dataset(
+    config: Config, case: str, start: int, stop: int, store: str | Path, n_threads: int = 1
+) -> xr.Dataset:
+    """Some runs of the baseline of a case.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    case
+        Name of the case.
+    start, stop
+        Number of the first sample and of that after the last; how many the baseline has plays no
+        part.
+    store
+        Folder of the store.
+    n_threads
+        Rows of samples computed at the same time.
+
+    Returns
+    -------
+    dataset
+        Layout ``runs``, with ``track_seed`` if the case has a random track; each sample under its
+        number in the baseline, all equally likely.
+
+    Raises
+    ------
+    ValueError
+        If there are no such samples, or as `stored_runs`.
+    """
+    if not 0 <= start < stop:
+        raise ValueError(f"samples must be numbered upwards from 0 or more, got {start} to {stop}")
+    rows = range(start, stop)
+    seeds = None
+    if case_of(config, case).random_track:
+        seeds = track_seeds(config, rows.stop)[rows.start :]
+    result = runs(
+        config,
+        case,
+        baseline(config, case, rows.stop)[rows.start :],
+        np.full(len(rows), 1.0 / len(rows)),
+        store,
+        track_seeds=seeds,
+        n_threads=n_threads,
+    )
+    return result.assign_coords(sample=np.array(rows))
+
+
+STAGE = Stage(
+    name="baseline_chunk",
+    of="case",
+    reads=RUNS_OF_CASE,
+    takes={"case": str, "start": int, "stop": int, "store": Path, "n_threads": int},
+    methods=(BASELINE,),
+    layout="runs",
+    compute=dataset,
+)

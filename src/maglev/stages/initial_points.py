@@ -1,0 +1,55 @@
+"""Points of the first design of a method, of a one-stage design all of them."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from maglev.parameters import Config
+from maglev.stage import Stage
+from maglev.stages import points
+from maglev.stages.points import case_of, gf_set, random_columns
+from maglev.stages.reads import RANDOM_GAINS
+from maglev.vocabulary import DESIGNED
+
+
+def dataset(config: Config, case: str, method: str) -> xr.Dataset:
+    """GF points of the random gains, fewer where fewer gains are random.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    case
+        Name of the case.
+    method
+        ``"osm"``, ``"asm_paper"`` or ``"asm"``.
+
+    Returns
+    -------
+    dataset
+        Layout ``points``.
+
+    Raises
+    ------
+    ValueError
+        If there is no such case.
+    """
+    design = getattr(config.study, method)
+    if method == "osm":
+        found = gf_set(config, case, design.n_runs, method)
+    else:
+        n_random = random_columns(case_of(config, case)).size
+        n = min(design.n_initial, design.initial_per_gain * n_random)
+        found = gf_set(config, case, n, f"initial_{method}")
+    return points.dataset(config, case, found)
+
+
+STAGE = Stage(
+    name="initial_points",
+    of="method",
+    reads=(*RANDOM_GAINS, "study.{method}", "study.n_counting"),
+    takes={"case": str, "method": str},
+    methods=DESIGNED,
+    layout="points",
+    compute=dataset,
+)

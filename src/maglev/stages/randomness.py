@@ -1,0 +1,37 @@
+"""Random numbers of the stages: each purpose has a source of its own, whatever else is drawn."""
+
+from __future__ import annotations
+
+import zlib
+
+import numpy as np
+
+
+def generator(seed: int, *key: str | int) -> np.random.Generator:
+    """Random numbers for what the model is run with: points, candidates, tracks, rounds.
+
+    Parameters
+    ----------
+    seed
+        Seed of the configuration.
+    key
+        Words and numbers; the same key gives the same numbers.
+    """
+    words = [list(part.encode()) if isinstance(part, str) else [part] for part in key]
+    return np.random.default_rng([seed, *(number for word in words for number in word)])
+
+
+def generator_of_statistics(seed: int, purpose: str) -> np.random.Generator:
+    """Random numbers for what is made of finished runs: populations, bootstraps, borders.
+
+    Seeds by the CRC-32 of the purpose, not by its letters as `generator` does: the numbers in
+    print were drawn so.
+
+    Parameters
+    ----------
+    seed
+        Seed of the configuration.
+    purpose
+        What the numbers are for; the same words give the same numbers.
+    """
+    return np.random.default_rng([seed, zlib.crc32(purpose.encode())])

@@ -1,0 +1,123 @@
+"""The words of the study: responses, gains, methods, and what a run, a design or a limit can be.
+
+Configuration, files, stages, rules and figures take them from here, so that a word is spelt once
+and its order is the same everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal, get_args
+
+Response = Literal[
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+    "car_body_acceleration_z",
+    "car_body_acceleration_y",
+]
+"""A response whose extreme a passage is judged by."""
+
+RESPONSES: tuple[Response, ...] = get_args(Response)
+"""The responses in the order of ``response`` in files and arrays."""
+
+_GIRDER = "of the girder at midspan of the middle span"
+_CAR = "of the car body, largest over the cars"
+RESPONSE_WORDS: Mapping[Response, str] = {
+    "girder_displacement_z": f"vertical displacement {_GIRDER}",
+    "girder_displacement_y": f"lateral displacement {_GIRDER}",
+    "girder_acceleration_z": f"vertical acceleration {_GIRDER}",
+    "girder_acceleration_y": f"lateral acceleration {_GIRDER}",
+    "car_body_acceleration_z": f"vertical acceleration {_CAR}",
+    "car_body_acceleration_y": f"lateral acceleration {_CAR}",
+}
+"""Meaning of each response, as it follows "largest absolute"."""
+
+RESPONSE_UNITS: Mapping[Response, str] = {
+    name: "m" if "displacement" in name else "m s-2" for name in RESPONSES
+}
+"""Unit of each response in the notation of UDUNITS."""
+
+Gain = Literal[
+    "suspension_proportional",
+    "suspension_derivative",
+    "guidance_proportional",
+    "guidance_derivative",
+]
+"""A gain, named as in the section ``gains`` of the configuration."""
+
+GAIN_KEYS: tuple[Gain, ...] = get_args(Gain)
+"""The gains in the order of the columns of the array that `maglev.simulate` takes."""
+
+GAINS = tuple(f"{key}_gain" for key in GAIN_KEYS)
+"""Names of the gains in files, in the same order."""
+
+GAIN_UNITS: Mapping[str, str] = {
+    name: "A m-1" if "proportional" in name else "A s m-1" for name in GAINS
+}
+"""Unit of each gain in the notation of UDUNITS."""
+
+Method = Literal["mcm", "osm", "asm_paper", "asm"]
+"""How the runs of a case are chosen: plain Monte Carlo, one-stage set, adaptive as published,
+adaptive towards the limits."""
+
+METHODS: tuple[Method, ...] = get_args(Method)
+"""The methods in the order in which they are shown."""
+
+BASELINE: Method = "mcm"
+"""The method whose runs are the baseline that others are judged by."""
+
+DESIGNED: tuple[Method, ...] = tuple(name for name in METHODS if name != BASELINE)
+"""The methods that make a design and predict by a surrogate."""
+
+ADAPTIVE: tuple[Method, ...] = ("asm_paper", "asm")
+"""The methods whose designs grow in rounds."""
+
+Surrogate = Literal["rbf", "scaled_rbf", "kriging"]
+"""A kind of surrogate."""
+
+SURROGATES: tuple[Surrogate, ...] = get_args(Surrogate)
+"""The kinds of surrogate."""
+
+STATUS = {0: "completed", 1: "contact", 2: "gap_lost", 3: "not_finite", 4: "step_too_large"}
+"""How a passage ended: levitated throughout, why it stopped, or that it was not judged."""
+
+STEP_TOO_LARGE = 4
+"""Status of a passage that was not judged: its gains need a smaller step."""
+
+TRAIN_PARTS = (
+    "car_body_lateral",
+    "car_body_vertical",
+    "car_body_roll",
+    "car_body_pitch",
+    "car_body_yaw",
+    "bogies",
+    "rods",
+    "suspension_magnets",
+    "guidance_magnets",
+)
+"""What moves in a mode of the train."""
+
+DECISIONS = (
+    "go_on",
+    "error_below_threshold",
+    "limits_settled",
+    "largest_number_of_runs",
+)
+"""What is decided after a round of an adaptive design."""
+
+GIVEN, TOO_FEW, INFINITE = LIMIT_STATUS = ("given", "too_few_exceedances", "infinite")
+"""What can be said of a limit: its value; that the sample does not carry it; that losses alone are
+likelier than the failure probability, so that none is finite."""
+
+DENSITY_METHODS = ("gdee", "gdee_of_the_logarithm", "direct")
+"""How a density was found: by the GDEE; by the GDEE of the logarithm of the extreme, where strays
+ask for too fine a mesh; directly, where there is no GDEE or it refused both."""
+
+SOURCES = ("paper", "ours")
+"""Whose number stands there."""
+
+TRACK_PARTS = ("gains_only", "track_only", "other_track", "other_gains")
+"""Further runs of a case whose baseline has gains i on track i: gains i on the configured track;
+mean gains on track i; gains i on track n + i; gains n + i on track i (n samples)."""

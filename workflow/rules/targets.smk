@@ -1,0 +1,78 @@
+# Which files the cases of the configuration and their methods have, for figures and targets.
+
+
+GAIN_CASES = [
+    case for case in parameters.cases if case.startswith("only_") or case == "all_gains"
+]
+VARIATION_CASES = [case for case in parameters.cases if case.startswith("cov_")]
+TRACK_CASES = [case for case in parameters.cases if parameters.cases[case].random_track]
+
+
+def judged(case: str) -> bool:
+    """Whether a case has a baseline and something to judge by it."""
+    return bool(methods_of(case, (BASELINE,)) and methods_of(case, DESIGNED))
+
+
+def of_methods(stage: str, case: str) -> list[str]:
+    """Files of a stage of each method of a case that it is made for."""
+    methods = methods_of(case, STAGES[stage].methods)
+    return [place(stage, case=case, method=method) for method in methods]
+
+
+def of_baseline(stage: str) -> list[str]:
+    """The file of the baseline of the case of the tables, if it has one."""
+    has_one = methods_of(TABLE_CASE, (BASELINE,))
+    return [place(stage, case=TABLE_CASE, method=BASELINE)] if has_one else []
+
+
+def of_judged(stage: str) -> list[str]:
+    """The file of the case of the tables, if its methods can be judged by a baseline."""
+    return [place(stage, case=TABLE_CASE)] if judged(TABLE_CASE) else []
+
+
+def of_last_method(cases: list[str], *stages: str) -> list[str]:
+    """A file of each stage and case by the last of its methods with a surrogate, or none at all."""
+    designed = [methods_of(case, DESIGNED) for case in cases]
+    return [
+        place(stage, case=case, method=methods[-1])
+        for stage in stages
+        for case, methods in zip(cases, designed, strict=True)
+        if all(designed)
+    ]
+
+
+def possible(stage, case: str) -> bool:
+    """Whether a case has what a stage of it needs: methods, and a random track for its parts."""
+    of_track = "track_runs" in (stage.name, *stage.inputs)
+    needed = [STAGES[role] for role, one in stage.inputs.items() if not one.optional]
+    return (case in TRACK_CASES or not of_track) and all(
+        methods_of(case, one.methods) for one in (stage, *needed)
+    )
+
+
+def results() -> list[str]:
+    """The file of every stage for all cases and methods that are named."""
+    files = (
+        [place("statistics_check", scope="statistics")] if checked_cases(False) else []
+    )
+    for name, stage in STAGES.items():
+        wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
+        if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
+            files.append(place(name))
+        if wildcards == {"case"}:
+            cases = [case for case in parameters.cases if possible(stage, case)]
+            files += [place(name, case=case) for case in cases]
+        if wildcards == {"case", "method"}:
+            files += [
+                file for case in parameters.cases for file in of_methods(name, case)
+            ]
+    return files
+
+
+def figures_of_study() -> list[str]:
+    """Figures that the cases and methods named in the configuration allow."""
+    return [
+        f"<results>/figures/{name}.png"
+        for name, (_, _, files) in DRAWN.items()
+        if files
+    ]
