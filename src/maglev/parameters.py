@@ -16,7 +16,14 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from maglev.vocabulary import GAIN_KEYS, Gain, Method, Response, Surrogate
 
@@ -187,7 +194,10 @@ class Parameters(BaseModel):
             elif isinstance(value, tuple) and value and isinstance(value[0], Parameters):
                 out[name] = [item.quantities() for item in value]
             elif isinstance(value, Mapping):
-                out[name] = {key: item.quantities() for key, item in value.items()}
+                out[name] = {
+                    key: item.quantities() if isinstance(item, Parameters) else item
+                    for key, item in value.items()
+                }
             elif isinstance(extra, dict) and extra.get("unit") and value is not None:
                 out[name] = f"{value!r} {extra['unit']}"
             elif isinstance(value, tuple):
@@ -1093,6 +1103,11 @@ class Case(Parameters):
     """Which gains are random, how much, on how many spans, and by which methods."""
 
     n_spans: int = _count(5, "number of spans, in place of guideway.n_spans")
+    set: Mapping[str, Any] = Field(
+        {},
+        description="values of this case alone by the dotted keys of train, guideway, "
+        "irregularity, gains, control and passage, such as {control.suspension.group: ends}",
+    )
     coefficient_of_variation: float = Field(
         0.10,
         description="standard deviation of each random gain over its mean; normal, independent",
@@ -1111,6 +1126,9 @@ class Case(Parameters):
     random_track: bool = Field(
         False, description="whether each sample has an irregularity of its own (mcm only)"
     )
+
+    def __hash__(self) -> int:
+        return hash(repr(self))
 
     @model_validator(mode="before")
     @classmethod
@@ -1145,6 +1163,21 @@ def _cases() -> dict[str, Case]:
     for percent in range(4, 16, 2):
         cases[f"cov_{percent:03d}"] = Case(coefficient_of_variation=percent / 100)
     return cases
+
+
+_OF_A_CASE = ("train", "guideway", "irregularity", "gains", "control", "passage")
+"""Sections in which a case may have values of its own."""
+
+
+def _with_value(section: Any, keys: list[str], value: Any) -> Any:
+    """A section with another value at nested keys, read and checked as a file's would be."""
+    first, *rest = keys
+    if not isinstance(section, Parameters) or first not in type(section).model_fields:
+        raise KeyError(first)
+    if not rest:
+        return type(section).model_validate(section.quantities() | {first: value})
+    inner = _with_value(getattr(section, first), rest, value)
+    return section.model_copy(update={first: inner})
 
 
 def _normal_cdf(u: float) -> float:
@@ -1205,8 +1238,56 @@ class Config(Parameters):
                 )
         return {name: case for name, case in cases.items() if case is not None}
 
+    def with_values(self, values: Mapping[str, Any], place: str = "") -> Config:
+        """Return the configuration with other values at dotted keys, written as in a file.
+
+        Parameters
+        ----------
+        values
+            Such as ``{"passage.speed": "500 km/h"}``.
+        place
+            What the keys belong to, for messages.
+
+        Raises
+        ------
+        ValueError
+            If a key is none of a case's, or its value will not do.
+        """
+        changed = self
+        for dotted, value in values.items():
+            keys = dotted.split(".")
+            if keys[0] not in _OF_A_CASE or len(keys) < 2:
+                raise ValueError(
+                    f"{place}{dotted} cannot be set for a case alone; the sections that can are "
+                    f"{', '.join(_OF_A_CASE)}, such as passage.speed"
+                )
+            if dotted == "guideway.n_spans":
+                raise ValueError(f"{place}{dotted} is the case's n_spans: write it there")
+            try:
+                changed = _with_value(changed, keys, value)
+            except ValidationError as error:
+                why = error.errors()[0]["msg"].removeprefix("Value error, ")
+                raise ValueError(f"{place}{dotted}: {why}") from None
+            except KeyError as error:
+                raise ValueError(
+                    f"{place}{dotted} is no key of the configuration: there is no {error.args[0]!r}"
+                ) from None
+        return changed
+
+    def with_case_set(self, name: str) -> Config:
+        """Return the configuration in which a case's own values are those of all.
+
+        The case then sets nothing any more.
+        """
+        case = self.cases[name]
+        if not case.set:
+            return self
+        plain = case.model_copy(update={"set": {}})
+        changed = self.with_values(case.set, f"cases.{name}.set: ")
+        return changed.model_copy(update={"cases": {**self.cases, name: plain}})
+
     def of_case(self, name: str) -> Config:
-        """Return the configuration with the guideway of a case.
+        """Return the configuration with a case's own values and its guideway.
 
         Raises
         ------
@@ -1215,9 +1296,9 @@ class Config(Parameters):
         """
         if name not in self.cases:
             raise ValueError(f"there is no case '{name}', known are: {', '.join(self.cases)}")
-        n_spans = self.cases[name].n_spans
-        guideway = self.guideway.model_copy(update={"n_spans": n_spans})
-        return self.model_copy(update={"guideway": guideway})
+        own = self.with_case_set(name)
+        guideway = own.guideway.model_copy(update={"n_spans": own.cases[name].n_spans})
+        return own.model_copy(update={"guideway": guideway})
 
     def statically_stable(self, case: Case) -> float:
         """Probability that the gains of a case can hold the train statically [-].
@@ -1247,20 +1328,29 @@ class Config(Parameters):
     @model_validator(mode="after")
     def _check_cases(self) -> Config:
         for name, case in self.cases.items():
-            for gain in case.random_gains:
-                if not getattr(self.gains, gain) > 0:
-                    raise ValueError(
-                        f"cases.{name}.random_gains: {gain} cannot be random, its mean is zero"
-                    )
-            stable = self.statically_stable(case)
-            if stable < 0.5:
-                raise ValueError(
-                    f"cases.{name}.coefficient_of_variation = {case.coefficient_of_variation:g} "
-                    f"leaves only {100 * stable:.0f} % of the gains statically stable "
-                    "(k_p > i0/delta0, k_d >= 0), expected at least half; lower it or raise the "
-                    "mean gains"
-                )
+            if case.set:
+                own = self.with_case_set(name)
+                type(self).model_validate(own.quantities() | {"cases": {}})
+                own._check_case(name, own.cases[name])
+            else:
+                self._check_case(name, case)
         return self
+
+    def _check_case(self, name: str, case: Case) -> None:
+        """Refuse a case whose gains cannot be random or hardly ever hold the train."""
+        for gain in case.random_gains:
+            if not getattr(self.gains, gain) > 0:
+                raise ValueError(
+                    f"cases.{name}.random_gains: {gain} cannot be random, its mean is zero"
+                )
+        stable = self.statically_stable(case)
+        if stable < 0.5:
+            raise ValueError(
+                f"cases.{name}.coefficient_of_variation = {case.coefficient_of_variation:g} "
+                f"leaves only {100 * stable:.0f} % of the gains statically stable "
+                "(k_p > i0/delta0, k_d >= 0), expected at least half; lower it or raise the "
+                "mean gains"
+            )
 
     @model_validator(mode="after")
     def _check(self) -> Config:

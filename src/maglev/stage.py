@@ -148,11 +148,14 @@ class Stage:
         Returns
         -------
         part
-            Of a stage that reads its case: without the other cases, the guideway with the spans of
-            the case; its methods are the one method.
+            Of a stage that reads its case: without the other cases, the case's own values in their
+            sections and the guideway with its spans; its methods are the one method.
         """
+        keys = self.keys(case, method)
+        if case is not None and self.reads_of != "run":
+            config = config.with_case_set(case)
         whole = config.quantities()
-        part = _chosen(whole, self.keys(case, method))
+        part = _chosen(whole, keys)
         if self.reads_of != "run":
             assert case is not None  # keys has asked for it
             own = {"methods": [method or BASELINE], **part.get("cases", {}).get(case, {})}
@@ -181,6 +184,8 @@ class Stage:
             raise ValueError(f"{self.name} needs a method of {', '.join(self.methods)}: {method}")
         if self.reads_of != "run" and case not in config.cases:
             raise ValueError(f"there is no case '{case}', known are: {', '.join(config.cases)}")
+        if case is not None and self.reads_of != "run":
+            config = config.with_case_set(case)
         hashes = {name: file_hash(path) for name, path in self.files(config, case, method).items()}
         keys = self.keys(case, method)
         return cast(Config, View(self.name, config, keys, files=tuple(sorted(hashes.items()))))

@@ -59,7 +59,7 @@ def marginals(config: Config, case: str) -> Marginals:
         If there is no such case.
     """
     chosen = case_of(config, case)
-    mean = np.array(config.gains.as_row)[random_columns(chosen)]
+    mean = np.array(config.with_case_set(case).gains.as_row)[random_columns(chosen)]
     return Marginals([norm(one, chosen.coefficient_of_variation * one) for one in mean])
 
 
