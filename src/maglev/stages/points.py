@@ -81,7 +81,7 @@ def gains_at(config: Config, case: str, standard: npt.ArrayLike) -> FloatArray:
         Gains [A/m, A s/m, A/m, A s/m]; those that are not random at their means.
     """
     standard = np.asarray(standard, dtype=np.float64)
-    gains = np.tile(np.array(config.gains.as_row), (standard.shape[0], 1))
+    gains = np.tile(np.array(config.with_case_set(case).gains.as_row), (standard.shape[0], 1))
     columns = random_columns(case_of(config, case))
     gains[:, columns] = marginals(config, case).from_standard(standard)
     return gains
