@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,15 +151,19 @@ class Rails:
         self.ends = sp.csr_array((share, (row, dof)), shape=(n_rows, model.n_dof))
         self.ends_transposed = self.ends.T.tocsr()
 
-    def under(self, x: Array, speed: float) -> tuple[sp.csr_array, sp.csr_array]:
+    def under(self, x: Array, speed: float, step: float) -> tuple[sp.csr_array, sp.csr_array]:
         """Rows of what the faces of poles see of the rails.
+
+        What jumps where a joint passes counts with its mean over one step, so that its impulse does
+        not hang on where in a step the joint is met: the difference of a face's edges, and all that
+        a point sees.  For what does not jump that is an error of second order, like the step's.
 
         Parameters
         ----------
         x : (pole,)
             Places of the poles' centres [m].
-        speed
-            Of the train [m/s].
+        speed, step
+            Of the train [m/s], and Δt [s].
 
         Returns
         -------
@@ -167,62 +172,44 @@ class Rails:
         travel : csr (pole, end)
             What its rate has because the pole travels [1/s, m/s].
         """
-        front, rear = x + 0.5 * self.face, x - 0.5 * self.face
+        deflection, slope = timoshenko.deflection_shape, timoshenko.slope_shape
+        front, rear, advance = x + 0.5 * self.face, x - 0.5 * self.face, speed * step
         point = self.face == 0
-        element, at, weight = self._pieces(rear, front)
-        deflection = timoshenko.deflection_shape
-        mean = self._rows(deflection, element, at, weight)
-        edge_element = np.stack([self._element(front), self._element(rear)], axis=1)
-        edge_at = np.stack([front, rear], axis=1)
-        per_face = speed / np.where(point, np.inf, self.face)
-        sign = np.stack([per_face, -per_face], axis=1) * self._on(edge_at)
-        travel = self._rows(deflection, edge_element, edge_at, sign)
+        mean = self._mean(deflection, x, np.where(point, advance, self.face))
+        rate = speed / np.where(point, np.inf, self.face)
+        travel = self._mean(deflection, front, advance, rate)
+        travel = travel - self._mean(deflection, rear, advance, rate)
         if point.any():
-            slope = np.where(point & self._on(x), speed, 0.0)[:, None]
-            travel = travel + self._rows(
-                timoshenko.slope_shape, self._element(x)[:, None], x[:, None], slope
-            )
+            travel = travel + self._mean(slope, x, advance, np.where(point, speed, 0.0))
         return mean, travel
 
-    def _on(self, x: Array) -> npt.NDArray[np.bool_]:
-        return (x >= 0) & (x <= self.end)
-
-    def _element(self, x: Array) -> IntArray:
-        return np.clip(np.searchsorted(self.start, x, side="right") - 1, 0, None)
-
-    def _pieces(self, rear: Array, front: Array) -> tuple[IntArray, Array, Array]:
-        """Gauss points of each face, element by element: element, place [m], weight [-].
-
-        A face of no length has its one point; a part off the guideway has weight zero.
-        """
-        low, high = (np.clip(x, 0.0, self.end) for x in (rear, front))
-        first = self._element(low)
-        count = int((np.searchsorted(self.start, high) - first).max(initial=1))
-        element = first[:, None] + np.arange(max(count, 1))
+    def _mean(
+        self,
+        shape: Callable[..., Array],
+        x: Array,
+        width: npt.ArrayLike,
+        times: npt.ArrayLike = 1.0,
+    ) -> sp.csr_array:
+        """Rows (pole, end) of a mean over ``width`` around ``x`` [m], nothing off the guideway."""
+        width = np.broadcast_to(width, x.shape)
+        low, high = (np.clip(x + side * width, 0.0, self.end) for side in (-0.5, 0.5))
+        first = np.clip(np.searchsorted(self.start, low, side="right") - 1, 0, None)
+        n_pieces = int((np.searchsorted(self.start, high) - first).max(initial=1))
+        element = first[:, None] + np.arange(n_pieces)
         inside = element < self.start.size
         element = np.minimum(element, self.start.size - 1)
-        begin = np.clip(self.start[element], low[:, None], high[:, None])
-        stop = np.clip(self.start[element] + self.length[element], low[:, None], high[:, None])
-        length = np.where(inside, stop - begin, 0.0)
-        at = begin[..., None] + length[..., None] * _GAUSS
-        face = np.where(self.face > 0, self.face, np.inf)
-        weight = np.repeat((0.5 * length / face[:, None])[..., None], 2, axis=-1)
-        point = (self.face == 0) & self._on(rear)
-        weight[point, 0, 0] = 1.0
-        n = rear.size
-        return np.repeat(element, 2, axis=1), at.reshape(n, -1), weight.reshape(n, -1)
-
-    def _rows(self, shape, element: IntArray, at: Array, weight: Array) -> sp.csr_array:
-        """Rows (pole, end) of a weighted sum over points (pole, point)."""
-        line = self.line[:, None]
-        local = np.clip(at - self.start[element], 0.0, self.length[element])
-        share = shape(self.length[element], self.phi[line, element], local) * weight[..., None]
-        column = 4 * (line * self.start.size + element)[..., None] + np.arange(4)
-        pointer = share.shape[1] * 4 * np.arange(share.shape[0] + 1)
-        rows = sp.csr_array(
-            (share.ravel(), column.ravel(), pointer), shape=(share.shape[0], self.ends.shape[0])
+        origin, L = self.start[element], self.length[element]
+        begin = np.clip(origin, low[:, None], high[:, None]) - origin
+        piece = np.clip(origin + L, low[:, None], high[:, None]) - origin - begin
+        weight = np.where(inside, piece / width[:, None], 0.0)
+        weight *= np.broadcast_to(times, x.shape)[:, None]
+        phi = self.phi[self.line[:, None], element]
+        share = sum(0.5 * shape(L, phi, begin + at * piece) for at in _GAUSS) * weight[..., None]
+        end = 4 * (self.line[:, None] * self.start.size + element)[..., None] + np.arange(4)
+        pointer = share[0].size * np.arange(x.size + 1)
+        return sp.csr_array(
+            (share.ravel(), end.ravel(), pointer), shape=(x.size, self.ends.shape[0])
         )
-        return rows
 
 
 class Track:
@@ -481,6 +468,10 @@ class Structure:
         M + γ Δt C + β Δt² K: what an acceleration at the end of the step meets.
     factors
         Of the effective mass.
+    modes, coefficient : (mode, dof), (mode, 1)
+        Damping of low rank on top, Σ c_k m_k m_kᵀ with m_k = M φ_k.
+    spread, gathered : (mode, dof), (mode, mode)
+        What the low rank adds to the inverse, by the formula of Sherman, Morrison and Woodbury.
     """
 
     mass: sp.csr_array
@@ -489,6 +480,31 @@ class Structure:
     step: float
     effective: sp.csc_array
     factors: SuperLU
+    modes: Array
+    coefficient: Array
+    spread: Array
+    gathered: Array
+
+    def inner(self, motion: Motion) -> Array:
+        """C v + K x, (dof, sample) [N, N m]."""
+        inner = self.damping @ motion.v + self.stiffness @ motion.x
+        if self.coefficient.size:
+            inner += self.modes.T @ (self.coefficient * (self.modes @ motion.v))
+        return inner
+
+    def acceleration(self, force: Array) -> Array:
+        """Acceleration at the end of the step under what the predicted motion leaves over."""
+        a = self.factors.solve(force)
+        if self.coefficient.size:
+            a -= self.spread.T @ (self.gathered @ (self.spread @ force))
+        return a
+
+    def dissipated(self, v: Array) -> Array:
+        """Power lost to damping (sample,) [W]."""
+        lost = (v * (self.damping @ v)).sum(axis=0)
+        if self.coefficient.size:
+            lost += (self.coefficient * (self.modes @ v) ** 2).sum(axis=0)
+        return lost
 
     def predicted(self, before: Motion) -> Motion:
         """The motion a step later as far as the last acceleration decides it."""
@@ -502,10 +518,24 @@ class Structure:
         return Motion(predicted.x + BETA * h**2 * a, predicted.v + GAMMA * h * a, a)
 
 
-def structure(mass, damping, stiffness, step: float) -> Structure:
-    """A structure with the factors of its effective mass."""
+def structure(
+    mass: sp.csr_array,
+    damping: sp.csr_array,
+    stiffness: sp.csr_array,
+    step: float,
+    modal: guideway_model.ModalDamping | None = None,
+) -> Structure:
+    """A structure with the factors of its effective mass; ``modal`` comes on top of ``damping``."""
     effective = sp.csc_array(mass + GAMMA * step * damping + BETA * step**2 * stiffness)
-    return Structure(mass, damping, stiffness, step, effective, _factors(effective))
+    factors, none = _factors(effective), np.zeros((0, mass.shape[0]))
+    fixed = (mass, damping, stiffness, step, effective, factors)
+    if modal is None or modal.coefficient.size == 0:
+        return Structure(*fixed, none, np.zeros((0, 1)), none, np.zeros((0, 0)))
+    modes = np.ascontiguousarray(modal.mass_shape.T)
+    spread = factors.solve(modal.mass_shape)
+    inverse = np.diag(1 / (GAMMA * step * modal.coefficient)) + modes @ spread
+    spread = np.ascontiguousarray(spread.T)
+    return Structure(*fixed, modes, modal.coefficient[:, None], spread, np.linalg.inv(inverse))
 
 
 def _factors(matrix: sp.csc_array) -> SuperLU:
@@ -528,11 +558,7 @@ class System:
     step
         Δt [s].
     train, guideway
-        The structures; the guideway's modal damping is apart, in ``modal``.
-    modal
-        Modal damping of the guideway, of low rank.
-    to_modes : (mode, dof)
-        Its shapes times the mass, transposed.
+        The structures.
     poles, rails, track, circuits
         What the magnets are, see and do.
     """
@@ -541,8 +567,6 @@ class System:
     step: float
     train: Structure
     guideway: Structure
-    modal: guideway_model.ModalDamping
-    to_modes: Array
     poles: Poles
     rails: Rails
     track: Track
@@ -571,9 +595,7 @@ def system(
         config=config,
         step=step,
         train=structure(mass, train.damping, train.stiffness, step),
-        guideway=structure(model.mass, of_structure, model.stiffness, step),
-        modal=modal,
-        to_modes=np.ascontiguousarray(modal.mass_shape.T),
+        guideway=structure(model.mass, of_structure, model.stiffness, step, modal),
         poles=poles,
         rails=Rails(model, poles),
         track=Track(profile, poles),
@@ -604,10 +626,8 @@ class State:
         The poles.
     on_train, on_guideway : (dof, sample)
         Forces of the magnets beyond those at rest on the train, and of all on the guideway [N].
-    modal_rate : (mode, sample)
-        Velocity of the guideway's modes that their damping has met.
     before
-        Pole forces and accelerations of train and guideway a step ago, to start the iteration.
+        Pole forces and the train's accelerations a step ago, to start the iteration.
     tangents
         Factors of the train's effective mass with its magnets closed, one a sample.
     """
@@ -618,8 +638,7 @@ class State:
     magnets: Magnets
     on_train: Array
     on_guideway: Array
-    modal_rate: Array
-    before: tuple[Array, Array, Array]
+    before: tuple[Array, Array]
     tangents: list[SuperLU]
 
 
@@ -637,8 +656,7 @@ def at_rest(of: System) -> State:
         magnets=magnets,
         on_train=np.zeros_like(train.x),
         on_guideway=np.zeros_like(guideway.x),
-        modal_rate=np.zeros((of.to_modes.shape[0], n_samples)),
-        before=(magnets.force, train.a, guideway.a),
+        before=(magnets.force, train.a),
         tangents=[closed_train(of, magnets, k) for k in range(n_samples)],
     )
 
@@ -683,12 +701,11 @@ def stepped(of: System, state: State, time: float, running: npt.NDArray[np.bool_
     """
     view = _view(of, time)
     train, guideway = of.train.predicted(state.train), of.guideway.predicted(state.guideway)
-    inner_train = of.train.damping @ train.v + of.train.stiffness @ train.x
-    modal_rate, inner_guideway = _guideway_inner(of, state, guideway, view.reached)
+    inner_train, inner_guideway = of.train.inner(train), of.guideway.inner(guideway)
     known = of.circuits.delayed(state.charge.signals)
     force = 2 * state.magnets.force - state.before[0]
     a_t, a_g = 2 * state.train.a - state.before[1], state.guideway.a
-    before = (state.magnets.force, state.train.a, state.guideway.a)
+    before = (state.magnets.force, state.train.a)
     tangents = state.tangents
     for iteration in range(1, MOST_ITERATIONS + 1):
         on_train = -(of.poles.opens.T @ (force - of.poles.static_force))
@@ -696,7 +713,7 @@ def stepped(of: System, state: State, time: float, running: npt.NDArray[np.bool_
         residual = on_train - inner_train - of.train.effective @ a_t
         a_t = a_t + np.column_stack([t.solve(residual[:, k]) for k, t in enumerate(tangents)])
         if view.reached:
-            a_g = of.guideway.factors.solve(on_guideway - inner_guideway)
+            a_g = of.guideway.acceleration(on_guideway - inner_guideway)
         now_t, now_g = of.train.moved(train, a_t), of.guideway.moved(guideway, a_g)
         magnets, charge, signal = _magnets(of, state.charge, known, view, now_t, now_g)
         change = np.abs(magnets.force - force) / of.poles.static_force
@@ -711,9 +728,7 @@ def stepped(of: System, state: State, time: float, running: npt.NDArray[np.bool_
             f"t = {time:.4f} s; take a smaller passage.time_step"
         )
     charge.signals.append(signal)
-    return State(
-        now_t, now_g, charge, magnets, on_train, on_guideway, modal_rate, before, state.tangents
-    )
+    return State(now_t, now_g, charge, magnets, on_train, on_guideway, before, state.tangents)
 
 
 @dataclass(frozen=True)
@@ -741,23 +756,7 @@ def _view(of: System, time: float) -> View:
     speed = of.config.passage.speed
     place = nose(of.config, time) + of.poles.x
     reached = bool((place + 0.5 * of.poles.face).max() >= 0)  # until then the guideway rests
-    return View(*of.track.under(place, speed), *of.rails.under(place, speed), reached)
-
-
-def _guideway_inner(
-    of: System, state: State, predicted: Motion, reached: bool
-) -> tuple[Array, Array]:
-    """Modes' velocity, and inner forces of the guideway as far as they are known before the step.
-
-    The modal damping is weak: it acts at a velocity extrapolated with the last two accelerations.
-    """
-    if not reached:
-        return state.modal_rate, np.zeros_like(state.guideway.x)
-    extrapolated = 2 * state.guideway.a - state.before[2]
-    modal_rate = of.to_modes @ (predicted.v + GAMMA * of.step * extrapolated)
-    inner = of.modal.mass_shape @ (of.modal.coefficient[:, None] * modal_rate)
-    inner += of.guideway.damping @ predicted.v + of.guideway.stiffness @ predicted.x
-    return modal_rate, inner
+    return View(*of.track.under(place, speed), *of.rails.under(place, speed, of.step), reached)
 
 
 def _magnets(
@@ -953,14 +952,12 @@ def _note(record: Record, step: int, every: int, of: System, at: Watch, state: S
 def _power(of: System, state: State) -> Array:
     """Power of the magnets on train and guideway, and what is dissipated [W], (3, sample)."""
     v_t, v_g = state.train.v, state.guideway.v
-    in_links = (v_t * (of.train.damping @ v_t)).sum(axis=0)
-    in_guideway = (v_g * (of.guideway.damping @ v_g)).sum(axis=0)
-    in_modes = (of.modal.coefficient[:, None] * state.modal_rate**2).sum(axis=0)
+    lost = of.train.dissipated(v_t) + of.guideway.dissipated(v_g)
     on_train, on_guideway = (
         (state.on_train * v_t).sum(axis=0),
         (state.on_guideway * v_g).sum(axis=0),
     )
-    return np.stack([on_train, on_guideway, in_links + in_guideway + in_modes])
+    return np.stack([on_train, on_guideway, lost])
 
 
 def _stored(of: System, state: State) -> Array:
