@@ -284,7 +284,8 @@ class LateralDamper(Parameters):
     damping: float = quantity(
         "N s/m", "lateral damping", 3e3, source="M", confidence="L", minimum=0
     )
-    z: float = quantity("m", "below the deck level (negative: above)", -0.5, source="A", confidence="L"
+    z: float = quantity(
+        "m", "below the deck level (negative: above)", -0.5, source="A", confidence="L"
     )
 
 
@@ -1301,10 +1302,10 @@ class Config(Parameters):
                 )
             if magnet.pole_length == 0 and self.passage.acceleration_band is None:
                 raise ValueError(
-                    "passage.acceleration_band: null (raw accelerations) needs poles with a length, "
-                    f"got train.{kind}_magnet.pole_length = 0 m: points step on and off the rail's "
-                    "joints, and the raw acceleration has no limit as step and cut-off are refined; "
-                    "give a pole_length or a band"
+                    "passage.acceleration_band: null (raw accelerations) needs poles with a "
+                    f"length, got train.{kind}_magnet.pole_length = 0 m: points step on and off "
+                    "the rail's joints, and the raw acceleration has no limit as step and cut-off "
+                    "are refined; give a pole_length or a band"
                 )
         if self.irregularity.fade_in > self.passage.approach:
             raise ValueError(

@@ -75,7 +75,7 @@ def simulate(
     ----------
     docs/theory/integration.md.
     """
-    gains = checked_gains(gains)
+    gains = checked_gains(gains, config.gains.further)
     if solver not in ("production", "reference"):
         raise ValueError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)

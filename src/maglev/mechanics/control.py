@@ -40,7 +40,7 @@ def grouping(group: str, n_poles: int) -> Grouping:
     """Circuits of a magnet with ``n_poles`` poles.
 
     The middle pole of an odd number belongs to both halves: it counts half in either mean, and its
-    current is the mean of the two.  The sensor at a magnet's end reads the gap of the outermost pole.
+    current is the mean of the two.  The sensor at a magnet's end reads the outermost pole's gap.
 
     Parameters
     ----------

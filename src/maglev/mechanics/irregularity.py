@@ -173,6 +173,55 @@ def displacement(profile: Profile, x: npt.ArrayLike) -> tuple[FloatArray, FloatA
     return value, slope
 
 
+def mean_displacement(
+    profile: Profile, x: npt.ArrayLike, length: float
+) -> tuple[FloatArray, FloatArray]:
+    """Mean of a profile over faces, and its derivative as the face moves on.
+
+    Parameters
+    ----------
+    profile
+        The profile.
+    x : (place,)
+        Middles of the faces [m].
+    length
+        Of a face [m]; zero for points.
+
+    Returns
+    -------
+    mean : (profile, place)
+        Displacement [m].
+    slope : (profile, place)
+        Derivative of the mean with respect to x [-].
+
+    Raises
+    ------
+    ValueError
+        If a face reaches beyond the grid.
+    """
+    x = np.asarray(x, dtype=float)
+    if length == 0:
+        return displacement(profile, x)
+    (near, _), (far, _) = (displacement(profile, x + part * length) for part in (-0.5, 0.5))
+    area = _area(profile, x + 0.5 * length) - _area(profile, x - 0.5 * length)
+    return area / length, (far - near) / length
+
+
+def _area(profile: Profile, x: FloatArray) -> FloatArray:
+    """Integral of the Hermite polynomials from the start of the grid (profile, place) [m²]."""
+    h = profile.dx
+    r, s = profile.values, h * profile.slopes
+    cells = h * (0.5 * (r[:, 1:] + r[:, :-1]) + (s[:, :-1] - s[:, 1:]) / 12)
+    whole = np.concatenate([np.zeros((r.shape[0], 1)), np.cumsum(cells, axis=1)], axis=1)
+    position = (x - profile.x0) / h
+    cell = np.clip(position.astype(int), 0, r.shape[1] - 2)
+    t = position - cell
+    r0, r1, s0, s1 = r[:, cell], r[:, cell + 1], s[:, cell], s[:, cell + 1]
+    quadratic, cubic = 3 * (r1 - r0) - 2 * s0 - s1, 2 * (r0 - r1) + s0 + s1
+    part = t * (r0 + t * (s0 / 2 + t * (quadratic / 3 + t * cubic / 4)))
+    return whole[:, cell] + h * part
+
+
 def spectral_density(spectrum: Spectrum, wavenumber: npt.ArrayLike) -> FloatArray:
     """One-sided power spectral density S(n), whose integral over n > 0 is the variance.
 

@@ -160,6 +160,130 @@ def rail_weights(
     )
 
 
+@dataclass(frozen=True)
+class FaceWeights:
+    """How coefficients of the rails make their mean motion under faces at places along the line.
+
+    Attributes
+    ----------
+    first : (place,)
+        First of the neighbouring coefficients, those of span after span, that count.
+    start : (place + 1,)
+        Where the weights of each place begin; places with no rail under the face have none.
+    weight : (coefficient,)
+        Of the coefficients in the mean motion [-].
+    slope : (coefficient,)
+        Of the coefficients in its derivative as the face moves on [1/m].
+    """
+
+    first: npt.NDArray[np.int64]
+    start: npt.NDArray[np.int64]
+    weight: Array
+    slope: Array
+
+
+def face_weights(
+    guideway: Guideway, x: npt.ArrayLike, length: float, *, lateral: bool
+) -> FaceWeights:
+    """Mean motion of the rails under faces, the rails straight and rigid off the guideway.
+
+    A face that passes a joint sees the step between two units as a ramp: the derivative of its mean
+    is the difference of the motions under its two edges over its length.
+
+    Parameters
+    ----------
+    guideway
+        Parameters.
+    x : (place,)
+        Middles of the faces, from the first pier [m].
+    length
+        Of a face [m]; zero for points.
+    lateral
+        Whether the motion is ``rail_y``; else ``rail_z`` or ``rail_roll``.
+
+    Returns
+    -------
+    weights
+        Of the coefficients.
+
+    References
+    ----------
+    docs/theory/integration.md, poles with a length.
+    """
+    x = np.asarray(x, dtype=float)
+    joints = _pieces(guideway)
+    near, far = x - 0.5 * length, x + 0.5 * length
+    last = joints.size - 2
+    on = (far > 1e-9) & (near < joints[-1] - 1e-9)
+    rear = np.clip(np.searchsorted(joints, near + 1e-9, side="right") - 1, 0, last)
+    front = np.clip(np.searchsorted(joints, far - 1e-9, side="left") - 1, 0, last)
+    front = np.maximum(front, rear)
+    first = _coefficient_of(guideway, rear)
+    count = np.where(on, _coefficient_of(guideway, front) + 4 - first, 0)
+    start = np.concatenate([[0], np.cumsum(count)])
+    weight, slope = np.zeros((2, start[-1]))
+    if length == 0:
+        _, values, slopes = _piece_weights(guideway, rear[on], x[on], lateral=lateral)
+        at = start[:-1][on, None] + np.arange(4)
+        weight[at], slope[at] = values, slopes
+        return FaceWeights(first, start, weight, slope)
+    gauss, share = np.polynomial.legendre.leggauss(2)  # exact for the cubic shapes of a piece
+    for step in range(int((front - rear)[on].max(initial=-1)) + 1):
+        which = np.flatnonzero(on & (rear + step <= front))
+        piece = rear[which] + step
+        low = np.maximum(near[which], joints[piece])
+        high = np.minimum(far[which], joints[piece + 1])
+        at = (start[which] + _coefficient_of(guideway, piece) - first[which])[:, None]
+        at = at + np.arange(4)
+        for node, part in zip(gauss, share, strict=True):
+            inside = 0.5 * (low + high) + 0.5 * (high - low) * node
+            _, values, _ = _piece_weights(guideway, piece, inside, lateral=lateral)
+            np.add.at(weight, at, values * (0.5 * part * (high - low) / length)[:, None])
+    for edge, piece, sign in ((near, rear, -1.0), (far, front, 1.0)):
+        which = np.flatnonzero(on & (edge >= -1e-9) & (edge <= joints[-1] + 1e-9))
+        coefficient, values, _ = _piece_weights(
+            guideway, piece[which], edge[which], lateral=lateral
+        )
+        at = (start[which] + coefficient - first[which])[:, None] + np.arange(4)
+        np.add.at(slope, at, values * (sign / length))
+    return FaceWeights(first, start, weight, slope)
+
+
+def _pieces(guideway: Guideway) -> Array:
+    """Where pieces of rail between neighbouring nodes meet, from the first pier to the last [m]."""
+    rail = guideway.rail
+    spacing = guideway.span_length / (rail.units_per_span * rail.connectors_per_unit)
+    nodes = rail_nodes(rail.connectors_per_unit)[:-1] * spacing
+    n_units = guideway.n_spans * rail.units_per_span
+    unit = guideway.span_length / rail.units_per_span
+    return np.append((np.arange(n_units)[:, None] * unit + nodes).ravel(), n_units * unit)
+
+
+def _coefficient_of(guideway: Guideway, piece: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """First of the four coefficients of a piece of rail, counted along the whole line."""
+    per_unit = guideway.rail.connectors_per_unit + 1
+    return 2 * (piece + piece // per_unit)
+
+
+def _piece_weights(
+    guideway: Guideway, piece: npt.NDArray[np.int64], x: Array, *, lateral: bool
+) -> tuple[npt.NDArray[np.int64], Array, Array]:
+    """As `rail_weights` for places of which the piece of rail is known, along the whole line."""
+    rail = guideway.rail
+    joints = _pieces(guideway)
+    spacing = guideway.span_length / (rail.units_per_span * rail.connectors_per_unit)
+    extent = np.diff(rail_nodes(rail.connectors_per_unit))[piece % (rail.connectors_per_unit + 1)]
+    extent = extent * spacing
+    phi = timoshenko.shear_flexibility(rail.section, extent)[1 if lateral else 0]
+    inside = np.clip(x - joints[piece], 0.0, extent)
+    per_coefficient = np.array([1.0, 1.0 / spacing, 1.0, 1.0 / spacing])
+    return (
+        _coefficient_of(guideway, piece),
+        timoshenko.deflection_shape(extent, phi, inside) * per_coefficient,
+        timoshenko.slope_shape(extent, phi, inside) * per_coefficient,
+    )
+
+
 def standing_sag(
     model: full.GuidewayModel,
     reduced: ReducedGuideway,
@@ -168,8 +292,9 @@ def standing_sag(
     pitch: float,
     *,
     lateral: bool,
+    pole_length: float = 0.0,
 ) -> tuple[Array, Array, Array]:
-    """What a row of poles at rest bends the rails by, beyond what the modes of a span hold.
+    """Static sag of the rails under a row of poles, less the part that the kept modes represent.
 
     The bays between connectors follow the poles at once: their modes lie far above the cut-off.
     The pole forces hardly vary, so that what the left-out modes add is taken once for all.
@@ -186,6 +311,8 @@ def standing_sag(
         Distance of neighbouring poles [m].
     lateral
         Whether the poles are those of the guidance magnets.
+    pole_length
+        Length of a pole's face, over which force and motion are averaged [m].
 
     Returns
     -------
@@ -203,6 +330,8 @@ def standing_sag(
     kind = 2 if lateral else 0
     right, left = (model.rail_rows(span * length + x, side)[kind][:, dof] for side in (1, -1))
     outward = (right - left if lateral else right + left).tocsr()
+    if pole_length > 0:
+        outward = _moving_mean(n_points, pole_length * n_points / length) @ outward
     load = np.stack([outward[k::n_phases].sum(axis=0) for k in range(n_phases)], axis=1) * force
     own = reduced.own_modes(span)
     shapes = reduced.basis[dof][:, own].toarray()
@@ -221,6 +350,21 @@ def standing_sag(
             (slope[:, 0], slope, slope[:, -1]),
         )
     )
+
+
+def _moving_mean(n_points: int, width: float) -> sp.csr_array:
+    """Mean (point, point) over ``width`` neighbouring points, the first next to the last.
+
+    Faces that reach over a pier lie on the next span, which is like this one.
+    """
+    reach = int(np.ceil(0.5 * width + 0.5))
+    offset = np.arange(-reach, reach + 1)
+    share = np.clip(0.5 * width + 0.5 - np.abs(offset), 0.0, 1.0) / width
+    offset, share = offset[share > 0], share[share > 0]
+    share = share / share.sum()
+    row = np.repeat(np.arange(n_points), offset.size)
+    column = (row + np.tile(offset, n_points)) % n_points
+    return sp.csr_array((np.tile(share, n_points), (row, column)), shape=(n_points, n_points))
 
 
 def reduce(

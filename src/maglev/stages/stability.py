@@ -8,7 +8,7 @@ import scipy.linalg
 import xarray as xr
 
 from maglev.mechanics import train as train_model
-from maglev.mechanics.integrate import closed_train
+from maglev.mechanics.step_limit import closed_train
 from maglev.parameters import Config
 
 PROPORTIONAL_RANGE, DERIVATIVE_RANGE = (0.4, 1.6), (0.4, 1.6)

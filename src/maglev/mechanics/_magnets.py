@@ -1,0 +1,295 @@
+"""Compiled: the magnets of one kind at one step, from the gaps to the forces.
+
+A magnet's poles see the rail under their faces, its circuits make currents of those gaps, and the
+poles pull at the magnet and at the rail.  Errors and rates count in the direction of the
+displacement, z down or y to the right, whatever opens the gap; ``outward`` is the sign between
+the two.
+"""
+
+from __future__ import annotations
+
+from maglev.compiled import kernel
+from maglev.mechanics._records import Circuits, Magnet
+from maglev.mechanics._rows import weighted_sum, zeros
+from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, minimum, store
+
+
+@kernel()
+def empty_magnet(rows, law):
+    """Room for one magnet."""
+    n = rows.offset.size
+    return Magnet(zeros(n), zeros(n), zeros(n), zeros(n), zeros(law.n_circuits))
+
+
+@kernel()
+def circuits_at_rest(rows, law):
+    """Circuits whose current holds the train still."""
+    n = 2 * rows.x.size * law.n_circuits
+    current, command = zeros(n), zeros(n)
+    for k in range(n):
+        store(current, k, rows.current_reference)
+        store(command, k, rows.current_reference)
+    n_signals = law.ring * n if law.delays else 1
+    signal = zeros(n_signals).reshape((max(1, n_signals // n), -1, LANES))
+    return Circuits(current, command, zeros(n), zeros(n), signal)
+
+
+@kernel()
+def _look(places, rows, law, row, side, step, train, rails, magnet):
+    """Gap error of each pole of a magnet, and its rate where a circuit is fed by it."""
+    field = 2 if rows.is_guidance else side
+    motion, motion_rate = rails.motion[field], rails.rate[field]
+    own_track = places.rail.shape[2] > 1
+    translation, rotation = rows.translation[row, side], rows.rotation[row, side]
+    shift, turn = load(train.position, translation), load(train.position, rotation)
+    shift_rate = load(train.predicted, translation)
+    turn_rate = load(train.predicted, rotation)
+    none = shift * 0.0
+    n_poles = rows.offset.size
+    for p in range(n_poles):
+        here = entry(places.number, row * n_poles + p) + step
+        at = 2 * here + side
+        arm = entry(rows.arm, p)
+        first = entry(places.first, here)
+        begin, end = entry(places.start, here), entry(places.start, here + 1)
+        rail = load(places.rail, at) if own_track else none + entry(places.rail, at)
+        if entry(law.senses, p) > 0:
+            rise = load(places.ramp, at) if own_track else none + entry(places.ramp, at)
+            for j in range(begin, end):
+                weight = entry(places.weight, j)
+                deflection = load(motion, first + j - begin)
+                rail = fma(deflection, weight, rail)
+                rise = fma(deflection, entry(places.rise, j), rise)
+                rise = fma(load(motion_rate, first + j - begin), weight, rise)
+            store(magnet.rate, p, fma(turn_rate, arm, shift_rate) - rise)
+        else:
+            for j in range(begin, end):
+                rail = fma(load(motion, first + j - begin), entry(places.weight, j), rail)
+        store(magnet.error, p, fma(turn, arm, shift) - rail)
+
+
+@kernel()
+def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
+    """Currents of a magnet's circuits: the law of control, its delay and its lag.
+
+    ``u = k_p e + k_d de/dt + k_a a + k_i ∫e dt`` of the signal a delay ago is added to the current
+    at rest, kept within the chopper's reach, and followed with the lag (docs/theory/control.md,
+    eqs. 1 to 3).  The acceleration is that of the step before; `_answer_acceleration` mends it.
+    """
+    kind = 1 if rows.is_guidance else 0
+    sign = rows.outward[side]
+    proportional = load(gains, 2 * kind) * sign
+    derivative = load(gains, 2 * kind + 1) * sign
+    none = proportional * 0.0
+    at_rest = none + rows.current_reference
+    first = (2 * row + side) * law.n_circuits
+    n = circuits.signal.shape[1]
+    for c in range(law.n_circuits):
+        if law.own_gap:
+            error, rate = load(magnet.error, c), load(magnet.rate, c)
+        else:
+            begin, end = entry(law.feed_start, c), entry(law.feed_start, c + 1)
+            weight, pole = law.feed_weight, law.feed_pole
+            error = weighted_sum(weight, pole, begin, end, magnet.error, none)
+            rate = weighted_sum(weight, pole, begin, end, magnet.rate, none)
+        here = first + c
+        if law.integrates:
+            mean = load(circuits.error, here) + error
+            store(circuits.integral, here, fma(mean, 0.5 * dt, load(circuits.integral, here)))
+            store(circuits.error, here, error)
+        if law.delays or law.accelerates or law.integrates:
+            signal = fma(proportional, error, derivative * rate)
+            if law.integrates:
+                gain = load(gains, 5 + 2 * kind) * sign
+                signal = fma(gain, load(circuits.integral, here), signal)
+            fast = none
+            if law.accelerates:
+                shift = load(train.before, rows.translation[row, side])
+                turn = load(train.before, rows.rotation[row, side])
+                acceleration = fma(turn, entry(law.arm, c), shift)
+                fast = load(gains, 4 + 2 * kind) * sign * acceleration
+            if law.delays:
+                # the acceleration of the step before is known only now
+                last = ((step - 1) % law.ring) * n + here
+                store(circuits.signal, last, load(circuits.signal, last) + fast)
+                store(circuits.signal, (step % law.ring) * n + here, signal)
+                signal = fast * law.undelayed
+                for j in range(3):
+                    slot = (step - law.behind - j + law.ring) % law.ring
+                    past = load(circuits.signal, slot * n + here)
+                    signal = fma(past, entry(law.delayed, j), signal)
+            else:
+                signal = signal + fast
+            command = at_rest + signal
+        else:
+            command = fma(proportional, error, fma(derivative, rate, at_rest))
+        command = maximum(minimum(command, rows.current_max), 0.0)
+        if law.decay > 0.0:
+            current = load(circuits.current, here) * law.decay
+            current = fma(load(circuits.command, here), law.command_before, current)
+            current = fma(command, law.command_now, current)
+            store(circuits.command, here, command)
+            store(circuits.current, here, current)
+            command = current
+        store(magnet.current, c, command)
+
+
+@kernel()
+def _attract(rows, law, row, side, gains, magnet):
+    """Pull of each pole; return the smallest and largest gap and the strongest current."""
+    sign = rows.outward[side]
+    n_poles = rows.offset.size
+    none = load(magnet.error, 0) * 0.0
+    reference = none + rows.gap_reference
+    smallest, largest, strongest = none + 1.0e9, none - 1.0e9, none
+    mean_gap = reference
+    if law.mean_gap_force:
+        for p in range(n_poles):
+            mean_gap = fma(load(magnet.error, p), sign / n_poles, mean_gap)
+    for p in range(n_poles):
+        gap = fma(load(magnet.error, p), sign, reference)
+        current = load(magnet.current, entry(law.first, p))
+        if not law.own_gap:
+            current = (current + load(magnet.current, entry(law.second, p))) * 0.5
+        ratio = current / mean_gap if law.mean_gap_force else current / gap
+        constant = entry(rows.constant, (2 * row + side) * n_poles + p)
+        store(magnet.pull, p, ratio * ratio * (sign * constant))
+        if law.accelerates:
+            by = mean_gap if law.mean_gap_force else gap
+            direct = law.command_now * law.undelayed
+            gain = load(gains, 4 + 2 * (1 if rows.is_guidance else 0)) * (2.0 * direct * constant)
+            answer = ratio / by * gain
+            store(magnet.stiffening, p, choose(rows.current_max, current, answer, 0.0))
+        smallest = minimum(smallest, gap)
+        largest = maximum(largest, gap)
+        strongest = maximum(strongest, current)
+    return smallest, largest, strongest
+
+
+@kernel()
+def _answer_acceleration(rows, law, row, side, gains, train, magnet, circuits, force_z, force_turn):
+    """Let the pulls answer to the acceleration of this step, not of the last: one Newton step.
+
+    Returns the forces on the magnet's two freedoms beyond those by the acceleration of the last.
+    """
+    n_poles = rows.offset.size
+    none = force_z * 0.0
+    a, b, c, d = none + rows.mass, none, none, none + rows.inertia
+    for p in range(n_poles):
+        g = load(magnet.stiffening, p)
+        arm = entry(rows.arm, p)
+        seen = 0.5 * (entry(law.arm, entry(law.first, p)) + entry(law.arm, entry(law.second, p)))
+        a = a + g
+        b = fma(g, seen, b)
+        c = fma(g, arm, c)
+        d = fma(g, arm * seen, d)
+    before_z = load(train.before, rows.translation[row, side])
+    before_turn = load(train.before, rows.rotation[row, side])
+    missing_z = force_z - before_z * rows.mass
+    missing_turn = force_turn - before_turn * rows.inertia
+    determinant = a * d - b * c
+    shift = (missing_z * d - missing_turn * b) / determinant
+    turn = (missing_turn * a - missing_z * c) / determinant
+    more_z, more_turn = none, none
+    for p in range(n_poles):
+        seen = 0.5 * (entry(law.arm, entry(law.first, p)) + entry(law.arm, entry(law.second, p)))
+        more = load(magnet.stiffening, p) * fma(turn, seen, shift)
+        store(magnet.pull, p, load(magnet.pull, p) + more)
+        more_z = more_z - more
+        more_turn = more_turn - more * entry(rows.arm, p)
+    gain = load(gains, 4 + 2 * (1 if rows.is_guidance else 0))
+    gain = gain * (rows.outward[side] * law.undelayed)
+    first = (2 * row + side) * law.n_circuits
+    for c in range(law.n_circuits):
+        command, current = load(circuits.command, first + c), load(circuits.current, first + c)
+        new = fma(gain, fma(turn, entry(law.arm, c), shift), command)
+        new = maximum(minimum(new, rows.current_max), 0.0)
+        store(circuits.current, first + c, fma(new - command, law.command_now, current))
+        store(circuits.command, first + c, new)
+    return more_z, more_turn
+
+
+@kernel()
+def _press(places, rows, row, side, step, rails, magnet):
+    """Spread the pulls over the rail under the poles' faces."""
+    pressed = rails.force[2 if rows.is_guidance else side]
+    n_poles = rows.offset.size
+    for p in range(n_poles):
+        here = entry(places.number, row * n_poles + p) + step
+        first = entry(places.first, here)
+        begin, end = entry(places.start, here), entry(places.start, here + 1)
+        pull = load(magnet.pull, p)
+        for j in range(begin, end):
+            at = first + j - begin
+            store(pressed, at, fma(pull, entry(places.weight, j), load(pressed, at)))
+
+
+@kernel()
+def attract(
+    places, rows, law, step, dt, gains, train, rails, magnet, circuits, keep, watch, outcome
+):
+    """Close all magnets of one kind: gaps, currents, forces on train and rails.
+
+    Parameters
+    ----------
+    places, rows, law
+        Where the poles are, the magnets, and how their circuits work.
+    step, dt
+        Number of the step and its length [s].
+    gains : (8, LANES)
+        Suspension k_p, k_d, guidance k_p, k_d, suspension k_a, k_i, guidance k_a, k_i.
+    train, rails
+        Their motion; receive the forces.
+    magnet, circuits
+        Room for one magnet, and the state of all circuits of the kind.
+    keep
+        Whether mean gaps and currents of each magnet are to be recorded.
+    watch, outcome
+        Receive gaps and currents.
+    """
+    kind = 1 if rows.is_guidance else 0
+    least, most = load(outcome.gap_min, kind), load(outcome.gap_max, kind)
+    strongest = load(outcome.current_max, kind)
+    none = least * 0.0
+    n_poles = rows.offset.size
+    for row in range(rows.x.size):
+        for side in range(2):
+            sign = rows.outward[side]
+            translation, rotation = rows.translation[row, side], rows.rotation[row, side]
+            _look(places, rows, law, row, side, step, train, rails, magnet)
+            _control(rows, law, row, side, step, dt, gains, train, magnet, circuits)
+            smallest, largest, strong = _attract(rows, law, row, side, gains, magnet)
+            total, moment = none, none
+            for p in range(n_poles):
+                pull = load(magnet.pull, p)
+                total = total + pull
+                moment = fma(pull, entry(rows.arm, p), moment)
+            force = load(train.force, translation) - (total - rows.static_force[row, side] * sign)
+            turn = load(train.force, rotation) - (moment - rows.static_moment[row, side] * sign)
+            if law.accelerates:
+                more, more_turn = _answer_acceleration(
+                    rows, law, row, side, gains, train, magnet, circuits, force, turn
+                )
+                force, turn = force + more, turn + more_turn
+            store(train.force, translation, force)
+            store(train.force, rotation, turn)
+            _press(places, rows, row, side, step, rails, magnet)
+            number = rows.number[row, side]
+            store(watch.magnet_min, number, smallest)
+            store(watch.magnet_max, number, largest)
+            if keep:
+                gaps = none
+                for p in range(n_poles):
+                    gaps = fma(load(magnet.error, p), sign, gaps)
+                store(watch.magnet_gap, number, gaps * (1.0 / n_poles) + rows.gap_reference)
+                currents = none
+                for p in range(n_poles):
+                    one = load(magnet.current, entry(law.first, p))
+                    other = load(magnet.current, entry(law.second, p))
+                    currents = currents + (one + other)
+                store(watch.magnet_current, number, currents * (0.5 / n_poles))
+            least, most = minimum(least, smallest), maximum(most, largest)
+            strongest = maximum(strongest, strong)
+    store(outcome.gap_min, kind, least)
+    store(outcome.gap_max, kind, most)
+    store(outcome.current_max, kind, strongest)

@@ -1,0 +1,231 @@
+"""What the kernels read and write: records of arrays, all samples of a row side by side.
+
+Arrays that end in ``LANES`` hold one number for each sample of a row; the others are shared by all.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+COMPLETED, CONTACT, GAP_LOST, NOT_FINITE, STEP_TOO_LARGE = 0, 1, 2, 3, 4
+"""How a passage ended: the values of ``status`` [-]."""
+
+
+class Vehicle(NamedTuple):
+    """Train with open magnets; links in rows and columns of non-zero coefficients.
+
+    Springs and dampers of a kind pull by ``stiffness * x + damping * velocity`` of what they hang
+    on; each degree of freedom is scaled so once for every kind of link that it meets.
+    """
+
+    inverse_mass: np.ndarray  # (dof,)
+    scaled_dof: np.ndarray  # (scaled,) degree of freedom
+    scaled_stiffness: np.ndarray  # (scaled,)
+    scaled_damping: np.ndarray  # (scaled,)
+    link_start: np.ndarray  # (link + 1,) what pulls in a link
+    link_scaled: np.ndarray  # (non-zero,)
+    link_coefficient: np.ndarray  # (non-zero,)
+    pull_start: np.ndarray  # (dof + 1,) the links that pull at a degree of freedom
+    pull_link: np.ndarray  # (non-zero,)
+    pull_coefficient: np.ndarray  # (non-zero,)
+    body_z: np.ndarray  # (car,) degree of freedom
+    body_y: np.ndarray  # (car,)
+
+
+class MagnetRows(NamedTuple):
+    """Magnets of one kind, right and left at the same place."""
+
+    x: np.ndarray  # (row,) centre relative to the nose [m]
+    number: np.ndarray  # (row, side) place in the train's table of magnets
+    translation: np.ndarray  # (row, side) degree of freedom
+    rotation: np.ndarray  # (row, side)
+    static_force: np.ndarray  # (row, side) [N]
+    static_moment: np.ndarray  # (row, side) [N m]
+    constant: np.ndarray  # (row, side, pole) K of F = K (i/gap)^2 [N m^2/A^2]
+    offset: np.ndarray  # (pole,) ahead of the centre [m]
+    arm: np.ndarray  # (pole,) displacement of the pole per rotation [m]
+    outward: np.ndarray  # (side,) sign of the displacement that opens the gap
+    gap_reference: float  # [m]
+    current_reference: float  # [A]
+    current_max: float  # [A]
+    mass: float  # [kg]
+    inertia: float  # [kg m^2]
+    is_guidance: bool
+
+
+class Law(NamedTuple):
+    """How the circuits of one kind of magnet make currents of gaps."""
+
+    n_circuits: int  # of one magnet
+    own_gap: bool  # every pole has a circuit that its own gap feeds
+    mean_gap_force: bool  # forces go by the magnet's mean gap
+    feed_start: np.ndarray  # (circuit + 1,) poles that feed a circuit
+    feed_pole: np.ndarray
+    feed_weight: np.ndarray
+    arm: np.ndarray  # (circuit,) displacement of the signal per rotation of the magnet [m]
+    senses: np.ndarray  # (pole,) whether the pole's gap feeds a circuit
+    first: np.ndarray  # (pole,) the two circuits whose mean is the current of a pole
+    second: np.ndarray
+    decay: float  # of the current in a step; zero without a lag [-]
+    command_now: float  # weights of the command at this step and the last in the current [-]
+    command_before: float
+    delays: bool
+    ring: int  # signals of so many steps are kept
+    behind: int  # steps back to the latest of the three signals that a delayed one is taken from
+    delayed: np.ndarray  # (3,) their weights [-]
+    undelayed: float  # weight of the signal at this step [-]
+    accelerates: bool  # some sample has a gain on the acceleration
+    integrates: bool  # some sample has an integral part
+
+
+class Circuits(NamedTuple):
+    """State of the circuits of one kind, those of a magnet next to each other."""
+
+    current: np.ndarray  # (circuit, LANES) [A]
+    command: np.ndarray  # (circuit, LANES) at the step before [A]
+    error: np.ndarray  # (circuit, LANES) at the step before [m]
+    integral: np.ndarray  # (circuit, LANES) of the error over time [m s]
+    signal: np.ndarray  # (ring, circuit, LANES) beyond the current at rest [A]
+
+
+class Magnet(NamedTuple):
+    """One magnet at one step: what its poles and circuits see and do."""
+
+    error: np.ndarray  # (pole, LANES) gap error, in the direction of the displacement [m]
+    rate: np.ndarray  # (pole, LANES) [m/s]
+    pull: np.ndarray  # (pole, LANES) force on the rail, in the direction of the displacement [N]
+    stiffening: np.ndarray  # (pole, LANES) force per acceleration of the circuit's signal [kg]
+    current: np.ndarray  # (circuit, LANES) [A]
+
+
+class Motion(NamedTuple):
+    """Degrees of freedom of the train, or coordinates of the guideway, at one step."""
+
+    position: np.ndarray  # (dof, LANES) at the step
+    velocity: np.ndarray  # (dof, LANES) half a step later
+    before: np.ndarray  # (dof, LANES) acceleration of the step before
+    predicted: np.ndarray  # (dof, LANES) velocity that the forces see
+    force: np.ndarray  # (dof, LANES) or the acceleration that follows from it
+
+
+class Rails(NamedTuple):
+    """Coefficients of the rails' motion: right z, left z, y; those of a span next to each other."""
+
+    motion: np.ndarray  # (field, coefficient, LANES)
+    rate: np.ndarray  # (field, coefficient, LANES)
+    force: np.ndarray  # (field, coefficient, LANES)
+
+
+class Watch(NamedTuple):
+    """What is remembered of the motions that are watched."""
+
+    left_out: np.ndarray  # (6, LANES) midspan by left-out modes, its change, acceleration; z, y
+    filtered: np.ndarray  # (4 section, LANES) state of the low-pass
+    recent: np.ndarray  # (2 response, LANES) last two values of each response
+    magnet_min: np.ndarray  # (magnet, LANES) smallest gap of each magnet at this step [m]
+    magnet_max: np.ndarray  # (magnet, LANES)
+    magnet_gap: np.ndarray  # (magnet, LANES) mean of its poles [m]
+    magnet_current: np.ndarray  # (magnet, LANES) [A]
+
+
+class Stages(NamedTuple):
+    """What is stepped of the guideway when: stages of a passage, and the rows that they step with.
+
+    Before the first stage the guideway rests.
+    """
+
+    first_step: np.ndarray  # (stage,) number of a step
+    start: np.ndarray  # (stage + 1,) into ``stepped``
+    tops: np.ndarray  # (stage,) where in ``stepped`` pier tops follow modes
+    stepped: np.ndarray  # coordinates that are stepped, of all stages
+    damping_from: np.ndarray  # (stepped,) row of the line's ``damping``
+    damping_to: np.ndarray
+    taken_from: np.ndarray  # (stepped,) row of the line's ``taken``
+    taken_to: np.ndarray
+    factor_start: np.ndarray  # (stepped + 1,) Cholesky rows of the mass of stepped pier tops
+    factor_top: np.ndarray  # coordinate
+    factor: np.ndarray
+    factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal
+    stilled_start: np.ndarray  # (stage + 1,) coordinates that the stage before stepped
+    stilled: np.ndarray
+
+
+class Line(NamedTuple):
+    """Guideway in component coordinates: modes of spans, modes of piers, pier tops.
+
+    A mode counts from where the pier tops would take it if it were rigid.  While the train is where
+    it is, only the coordinates of a stage are stepped; the other modes follow the pier tops.
+    """
+
+    n_spans: int
+    span_length: float
+    stride: int  # rows of rail coefficients a span
+    n_units: int  # units of rail a span, each with as many rows, an even number
+    upright_start: np.ndarray  # (span + 1,)
+    upright: np.ndarray  # coordinates that move a span's rails up and down
+    sideways_start: np.ndarray  # (span + 1,)
+    sideways: np.ndarray  # coordinates that roll a span or move it sideways
+    rail_z: np.ndarray  # (upright, stride)
+    rail_roll: np.ndarray  # (sideways, stride)
+    rail_y: np.ndarray  # (sideways, stride)
+    square: np.ndarray  # (mode,) squared circular frequency [1/s^2]
+    response: np.ndarray  # (mode,) makes the step exact for a mode on its own [-]
+    carried_start: np.ndarray  # (mode + 1,) what modes take along of the pier tops' motion
+    carried_top: np.ndarray  # coordinate
+    carried: np.ndarray
+    damping_column: np.ndarray  # coordinate, in rows that the stages name
+    damping: np.ndarray
+    taken_mode: np.ndarray  # the same as carried by pier tops, in rows that the stages name
+    taken: np.ndarray
+    stiffness_start: np.ndarray  # (top + 1,) between pier tops
+    stiffness_top: np.ndarray  # coordinate
+    stiffness: np.ndarray
+    stages: Stages
+    output_column: np.ndarray  # (output column,) coordinates that move midspan
+    midspan: np.ndarray  # (2, output column) z and y
+    middle: int  # span that midspan is of
+    rest: np.ndarray  # (3, stride) midspan z by z, y by roll and y of its left-out modes [m/N]
+
+
+class Places(NamedTuple):
+    """What a pole's face meets at every place it can be at after a whole number of steps."""
+
+    number: np.ndarray  # (row, pole) place at time zero; each step moves on by one
+    first: np.ndarray  # (place,) first of the rail coefficients under the face
+    start: np.ndarray  # (place + 1,) of their weights; none off the guideway
+    weight: np.ndarray  # of the coefficients in the rail's mean motion under the face
+    rise: np.ndarray  # of the coefficients in the rate of that mean as the pole moves on [1/s]
+    rail: np.ndarray  # (place, side, 1 or LANES) irregularity of all samples, or of each [m]
+    ramp: np.ndarray  # (place, side, 1 or LANES) its rate at the pole [m/s]
+
+
+class Run(NamedTuple):
+    """One passage and how it is watched."""
+
+    first_step: int  # until then the train rests
+    n_steps: int
+    time_step: float
+    speed: float
+    start: float  # place of the nose at time zero [m]
+    train_length: float
+    gap_contact: float
+    gap_lost: float
+    sections: np.ndarray  # (section, 6) low-pass on guideway accelerations
+    record_every: int  # steps between recorded rows; zero: none
+
+
+class Outcome(NamedTuple):
+    """What one row of samples leaves behind."""
+
+    extreme: np.ndarray  # (4 + 2 car, LANES) girder z, y, acceleration z, y; bodies' z; bodies' y
+    extreme_time: np.ndarray  # same
+    gap_min: np.ndarray  # (kind, LANES)
+    gap_max: np.ndarray
+    current_max: np.ndarray
+    status: np.ndarray  # (LANES,) int64
+    lost_time: np.ndarray  # (LANES,)
+    lost_magnet: np.ndarray  # (LANES,) int64
+    at_loss: np.ndarray  # (6, LANES) gap_min, gap_max, current_max of both kinds by then
+    history: np.ndarray  # (record, 4 + 2 car + 2 magnet, LANES)

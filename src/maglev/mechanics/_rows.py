@@ -1,0 +1,172 @@
+"""Compiled: sums and products whose factors are rows of samples."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from maglev.compiled import kernel
+from maglev.mechanics.lanes import LANES, WIDE, entry, fma, load, store
+
+CACHE_LINE = 8
+"""Doubles in a line of the processor's cache [-]."""
+
+
+@kernel()
+def zeros(n_rows):
+    """Rows of zeros ``(n_rows, LANES)`` that begin where a line of the processor's cache does.
+
+    Elsewhere each register of a row is read from two lines, at twice the cost.
+    """
+    whole = np.zeros(n_rows * LANES + CACHE_LINE)
+    start = -(whole.ctypes.data // 8) % CACHE_LINE
+    return whole[start : start + n_rows * LANES].reshape((n_rows, LANES))
+
+
+@kernel()
+def weighted_sum(coefficients, places, start, stop, source, total):
+    """``total + Σ_k coefficients[k] source[places[k]]`` for ``start`` ≤ k < ``stop``."""
+    for k in range(start, stop):
+        total = fma(load(source, entry(places, k)), entry(coefficients, k), total)
+    return total
+
+
+@kernel()
+def gather(source, columns, start, stop, packed, first):
+    """``packed[first + m] = source[columns[start + m]]``: products then read rows in a row."""
+    for m in range(start, stop):
+        store(packed, first + m - start, load(source, entry(columns, m)))
+
+
+@kernel()
+def transform(matrix, start, stop, packed, at, left, right, target, first):
+    """``target[first + k] = Σ_m matrix[start + m, k] packed[at + m]`` for ``left`` ≤ k < ``right``.
+
+    As many rows at once as there are registers; the order of a sum does not depend on it.
+    """
+    none = load(packed, at) * 0.0
+    width = matrix.shape[1]
+    k = left
+    while WIDE and k + 4 <= right:
+        a, b, c, d = none, none, none, none
+        place = start * width + k
+        for m in range(at, at + stop - start):
+            one = load(packed, m)
+            a = fma(one, entry(matrix, place), a)
+            b = fma(one, entry(matrix, place + 1), b)
+            c = fma(one, entry(matrix, place + 2), c)
+            d = fma(one, entry(matrix, place + 3), d)
+            place += width
+        store(target, first + k, a)
+        store(target, first + k + 1, b)
+        store(target, first + k + 2, c)
+        store(target, first + k + 3, d)
+        k += 4
+    while k < right:
+        a, b = none, none
+        place = start * width + k
+        for m in range(at, at + stop - start):
+            one = load(packed, m)
+            a = fma(one, entry(matrix, place), a)
+            b = fma(one, entry(matrix, place + 1), b)
+            place += width
+        store(target, first + k, a)
+        store(target, first + k + 1, b)
+        k += 2
+
+
+@kernel()
+def transform_both(
+    mean, up, up_end, turn, out, out_end, packed, left, right, right_rail, left_rail, first
+):
+    """Motion of both rails from that of their mean and the roll, each as by `transform`.
+
+    ``packed`` holds what moves the mean, then what rolls it.
+    """
+    n = up_end - up
+    none = load(packed, 0) * 0.0
+    width = mean.shape[1]
+    k = left
+    while WIDE and k + 4 <= right:
+        a, b, c, d = none, none, none, none
+        e, f, g, h = none, none, none, none
+        place = up * width + k
+        for m in range(n):
+            one = load(packed, m)
+            a = fma(one, entry(mean, place), a)
+            b = fma(one, entry(mean, place + 1), b)
+            c = fma(one, entry(mean, place + 2), c)
+            d = fma(one, entry(mean, place + 3), d)
+            place += width
+        place = out * width + k
+        for m in range(n, n + out_end - out):
+            one = load(packed, m)
+            e = fma(one, entry(turn, place), e)
+            f = fma(one, entry(turn, place + 1), f)
+            g = fma(one, entry(turn, place + 2), g)
+            h = fma(one, entry(turn, place + 3), h)
+            place += width
+        store(right_rail, first + k, a + e)
+        store(left_rail, first + k, a - e)
+        store(right_rail, first + k + 1, b + f)
+        store(left_rail, first + k + 1, b - f)
+        store(right_rail, first + k + 2, c + g)
+        store(left_rail, first + k + 2, c - g)
+        store(right_rail, first + k + 3, d + h)
+        store(left_rail, first + k + 3, d - h)
+        k += 4
+    while k < right:
+        a, b, e, f = none, none, none, none
+        place = up * width + k
+        for m in range(n):
+            one = load(packed, m)
+            a = fma(one, entry(mean, place), a)
+            b = fma(one, entry(mean, place + 1), b)
+            place += width
+        place = out * width + k
+        for m in range(n, n + out_end - out):
+            one = load(packed, m)
+            e = fma(one, entry(turn, place), e)
+            f = fma(one, entry(turn, place + 1), f)
+            place += width
+        store(right_rail, first + k, a + e)
+        store(left_rail, first + k, a - e)
+        store(right_rail, first + k + 1, b + f)
+        store(left_rail, first + k + 1, b - f)
+        k += 2
+
+
+@kernel()
+def project(matrix, columns, start, stop, left, right, source, first, target):
+    """``target[columns[m]] += Σ_k matrix[m, k] source[first + k]`` for ``left`` ≤ k < ``right``."""
+    width = matrix.shape[1]
+    m = start
+    while WIDE and m + 4 <= stop:
+        a, b = load(target, entry(columns, m)), load(target, entry(columns, m + 1))
+        c, d = load(target, entry(columns, m + 2)), load(target, entry(columns, m + 3))
+        place = m * width
+        for k in range(left, right):
+            one = load(source, first + k)
+            a = fma(one, entry(matrix, place + k), a)
+            b = fma(one, entry(matrix, place + width + k), b)
+            c = fma(one, entry(matrix, place + 2 * width + k), c)
+            d = fma(one, entry(matrix, place + 3 * width + k), d)
+        store(target, entry(columns, m), a)
+        store(target, entry(columns, m + 1), b)
+        store(target, entry(columns, m + 2), c)
+        store(target, entry(columns, m + 3), d)
+        m += 4
+    while m + 2 <= stop:
+        a, b = load(target, entry(columns, m)), load(target, entry(columns, m + 1))
+        place = m * width
+        for k in range(left, right):
+            one = load(source, first + k)
+            a = fma(one, entry(matrix, place + k), a)
+            b = fma(one, entry(matrix, place + width + k), b)
+        store(target, entry(columns, m), a)
+        store(target, entry(columns, m + 1), b)
+        m += 2
+    if m < stop:
+        a = load(target, entry(columns, m))
+        for k in range(left, right):
+            a = fma(load(source, first + k), entry(matrix, m * width + k), a)
+        store(target, entry(columns, m), a)

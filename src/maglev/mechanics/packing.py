@@ -1,0 +1,482 @@
+"""What the kernels read: train, magnets, circuits, places and guideway as arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from maglev.mechanics import guideway as guideway_model
+from maglev.mechanics import train as train_model
+from maglev.mechanics._records import (
+    Law,
+    Line,
+    MagnetRows,
+    Outcome,
+    Places,
+    Run,
+    Stages,
+    Vehicle,
+)
+from maglev.mechanics.activity import Stage, stages, stepped_mass, top_stiffness
+from maglev.mechanics.control import grouping
+from maglev.mechanics.course import first_step, n_steps, start, time_step
+from maglev.mechanics.irregularity import Profile, mean_displacement
+from maglev.mechanics.lanes import LANES
+from maglev.mechanics.reduction import ReducedGuideway, face_weights, standing_sag
+from maglev.mechanics.responses import acceleration_filter
+from maglev.mechanics.step_limit import step_response
+from maglev.parameters import Circuit, Config, Guideway, Magnet
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where poles of one kind can be after whole numbers of steps, and the sag of the rails there.
+
+    Attributes
+    ----------
+    x : (place,)
+        Middle of a pole's face [m].
+    pole_length
+        Of the face [m].
+    sag, sag_slope : (place, side)
+        Standing sag in the direction of the irregularity [m], and its derivative along travel [-].
+    """
+
+    x: Array
+    pole_length: float
+    sag: Array
+    sag_slope: Array
+
+
+def vehicle(train: train_model.TrainModel) -> Vehicle:
+    """Train with open magnets for the kernels."""
+    rows = train.link_rows.tocsr().sorted_indices()
+    columns = rows.tocsc().sorted_indices()
+    link = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
+    hangs = np.column_stack([rows.indices, train.link_stiffness[link], train.link_damping[link]])
+    scaled, number = np.unique(hangs, axis=0, return_inverse=True)
+    return Vehicle(
+        inverse_mass=1.0 / train.mass,
+        scaled_dof=scaled[:, 0].astype(np.int64),
+        scaled_stiffness=np.ascontiguousarray(scaled[:, 1]),
+        scaled_damping=np.ascontiguousarray(scaled[:, 2]),
+        link_start=rows.indptr.astype(np.int64),
+        link_scaled=number.ravel().astype(np.int64),
+        link_coefficient=rows.data.astype(np.float64),
+        pull_start=columns.indptr.astype(np.int64),
+        pull_link=columns.indices.astype(np.int64),
+        pull_coefficient=columns.data.astype(np.float64),
+        body_z=np.ascontiguousarray(train.car_body_dof[:, 1], dtype=np.int64),
+        body_y=np.ascontiguousarray(train.car_body_dof[:, 0], dtype=np.int64),
+    )
+
+
+def magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
+    """Magnets of one kind for the kernels."""
+    magnet: Magnet = (
+        train.parameters.guidance_magnet if guidance else train.parameters.suspension_magnet
+    )
+    table = train.magnets
+    right, left = (
+        np.flatnonzero((table.is_guidance == guidance) & (table.side == side)) for side in (1, -1)
+    )
+    right, left = right[np.argsort(-table.x[right])], left[np.argsort(-table.x[left])]
+    if right.size != left.size or np.abs(table.x[right] - table.x[left]).max() > 1e-9:
+        raise ValueError("magnets must stand in pairs, right and left at the same place")
+    number = np.stack([right, left], axis=1)
+    offset = train_model.pole_offsets(magnet)
+    arm = offset if guidance else -offset
+    rest = train_model.pole_static_force(train.parameters, table)[number][:, :, : offset.size]
+    return MagnetRows(
+        x=np.ascontiguousarray(table.x[right]),
+        number=number.astype(np.int64),
+        translation=table.translation_dof[number].astype(np.int64),
+        rotation=table.rotation_dof[number].astype(np.int64),
+        static_force=rest.sum(axis=2),
+        static_moment=(rest * arm).sum(axis=2),
+        constant=np.ascontiguousarray(
+            rest * (magnet.gap_reference / magnet.current_reference) ** 2
+        ),
+        offset=offset,
+        arm=arm,
+        outward=np.array([1.0, -1.0 if guidance else 1.0]),
+        gap_reference=magnet.gap_reference,
+        current_reference=magnet.current_reference,
+        current_max=magnet.current_max,
+        mass=magnet.mass,
+        inertia=magnet.inertia,
+        is_guidance=guidance,
+    )
+
+
+def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: Array) -> Law:
+    """Circuits of one kind of magnet for the kernels.
+
+    Parameters
+    ----------
+    circuit
+        Who shares a circuit, and how late its current comes.
+    rows
+        The magnets.
+    time_step
+        Δt [s].
+    gains : (sample, 8)
+        Of all samples: they say whether acceleration and integral part are needed at all.
+
+    Returns
+    -------
+    law
+        A command that is linear within a step is followed exactly by the lag; the delayed signal is
+        that of a parabola through three steps.
+
+    References
+    ----------
+    docs/theory/control.md, eqs. 1 to 3.
+    """
+    n_poles = rows.offset.size
+    group = grouping(circuit.group, n_poles)
+    feed = sp.csr_array(group.feed)
+    pairs = [np.flatnonzero(row) for row in group.drive]
+    decay, now, before = 0.0, 1.0, 0.0
+    if circuit.lag > 0:
+        part = time_step / circuit.lag
+        decay = math.exp(-part)
+        mean = -math.expm1(-part) / part
+        now, before = 1.0 - mean, mean - decay
+    whole = math.floor(circuit.delay / time_step * (1 + 1e-12))
+    behind = max(0, whole - 1)
+    t = circuit.delay / time_step - behind  # steps before the latest of the three
+    delayed = np.array([(t - 1) * (t - 2) / 2, t * (2 - t), t * (t - 1) / 2])
+    kind = 2 if rows.is_guidance else 0
+    return Law(
+        n_circuits=group.feed.shape[0],
+        own_gap=circuit.group == "pole",
+        mean_gap_force=group.mean_gap_force,
+        feed_start=feed.indptr.astype(np.int64),
+        feed_pole=feed.indices.astype(np.int64),
+        feed_weight=feed.data.astype(np.float64),
+        arm=group.feed @ rows.arm,
+        senses=group.feed.any(axis=0).astype(np.int64),
+        first=np.array([pair[0] for pair in pairs], dtype=np.int64),
+        second=np.array([pair[-1] for pair in pairs], dtype=np.int64),
+        decay=decay,
+        command_now=now,
+        command_before=before,
+        delays=circuit.delay > 0,
+        ring=behind + 3,
+        behind=behind,
+        delayed=delayed,
+        undelayed=(float(delayed[0]) if behind == 0 else 0.0) if circuit.delay > 0 else 1.0,
+        accelerates=bool(np.any(gains[:, 4 + kind])),
+        integrates=bool(np.any(gains[:, 5 + kind])),
+    )
+
+
+def _stride(guideway: Guideway) -> int:
+    """Rows of rail coefficients a span."""
+    rail = guideway.rail
+    return rail.units_per_span * 2 * (rail.connectors_per_unit + 2)
+
+
+def places(
+    config: Config,
+    rows: MagnetRows,
+    guideway: guideway_model.GuidewayModel,
+    reduced: ReducedGuideway,
+) -> tuple[Places, Ground]:
+    """Tabulate what the poles meet after whole numbers of steps; no track yet."""
+    advance = config.passage.speed * time_step(config)
+    begins = (rows.x[:, None] + rows.offset + start(config)) / advance
+    whole = np.floor(begins + 1e-6)
+    beyond = np.round(begins - whole, 6)  # share of a step; places with the same one form a series
+    series = np.unique(beyond)
+    earliest = int(whole.min())
+    count = int(whole.max()) - earliest + n_steps(config) + 1
+    number = (whole - earliest).astype(np.int64) + count * np.searchsorted(series, beyond)
+    x = ((earliest + np.arange(count) + series[:, None]) * advance).ravel()
+    magnet = _magnet(config, rows)
+    faces = face_weights(config.guideway, x, magnet.pole_length, lateral=rows.is_guidance)
+    sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x)
+    apart = np.array([1.0, -1.0 if rows.is_guidance else 1.0])
+    nothing = np.zeros((x.size, 2, 1))
+    tabulated = Places(
+        number=number,
+        first=faces.first,
+        start=faces.start,
+        weight=faces.weight,
+        rise=faces.slope * config.passage.speed,
+        rail=nothing,
+        ramp=nothing,
+    )
+    ground = Ground(
+        x=x,
+        pole_length=magnet.pole_length,
+        sag=sag[:, None] * apart,
+        sag_slope=sag_slope[:, None] * apart,
+    )
+    return tabulated, ground
+
+
+def _magnet(config: Config, rows: MagnetRows) -> Magnet:
+    return config.train.guidance_magnet if rows.is_guidance else config.train.suspension_magnet
+
+
+def tracks(
+    config: Config, grounds: tuple[Ground, Ground], profiles: Sequence[Profile]
+) -> list[tuple[Array, Array]]:
+    """For each kind of pole what it meets at its places, and its rate (place, side, profile)."""
+    met = []
+    for ground, rows in zip(grounds, (slice(0, 2), slice(2, 4)), strict=True):
+        rail, ramp = np.empty((2, *ground.sag.shape, len(profiles)))
+        for k, profile in enumerate(profiles):
+            value, slope = mean_displacement(profile, ground.x, ground.pole_length)
+            rail[..., k] = value[rows].T + ground.sag
+            ramp[..., k] = (slope[rows].T + ground.sag_slope) * config.passage.speed
+        met.append((rail, ramp))
+    return met
+
+
+def _standing_sag(
+    config: Config,
+    rows: MagnetRows,
+    guideway: guideway_model.GuidewayModel,
+    reduced: ReducedGuideway,
+    x: Array,
+) -> tuple[Array, Array]:
+    """Sag of the rails under poles at ``x`` beyond that of the modes, and its slope along x."""
+    length, n_spans = config.guideway.span_length, config.guideway.n_spans
+    magnet = _magnet(config, rows)
+    force = float(rows.constant.mean()) * (rows.current_reference / rows.gap_reference) ** 2
+    sag, slope = np.zeros_like(x), np.zeros_like(x)
+    for span in range(n_spans):
+        inside = np.flatnonzero((x >= span * length) & (x < (span + 1) * length))
+        places, of_span, its_slope = standing_sag(
+            guideway,
+            reduced,
+            span,
+            force,
+            magnet.pole_pitch,
+            lateral=rows.is_guidance,
+            pole_length=magnet.pole_length,
+        )
+        at = x[inside] - span * length
+        sag[inside] = np.interp(at, places, of_span)
+        slope[inside] = np.interp(at, places, its_slope)
+    return sag, slope
+
+
+def line(reduced: ReducedGuideway, config: Config) -> Line:
+    """Guideway for the kernels."""
+    columns, n = reduced.span_coordinates, reduced.n_modes
+    rails = [
+        [_relative(reduced, span, shapes[span]) for span in range(len(columns))]
+        for shapes in (reduced.rail_z, reduced.rail_roll, reduced.rail_y)
+    ]
+    least = 1e-9 * max(np.abs(z).max() for z in rails[0])
+
+    def moving(*kinds: list[Array]) -> list[IntArray]:
+        """Columns of each span that move its rails."""
+        return [
+            np.flatnonzero(sum(np.abs(one).max(axis=1) for one in shapes) > least)
+            for shapes in zip(*kinds, strict=True)
+        ]
+
+    def stacked(shapes: list[Array], chosen: list[IntArray]) -> Array:
+        return np.concatenate([one[which] for one, which in zip(shapes, chosen, strict=True)])
+
+    def numbered(chosen: list[IntArray]) -> tuple[IntArray, IntArray]:
+        """Start of each span, and the coordinates."""
+        numbers = [column[which] for column, which in zip(columns, chosen, strict=True)]
+        return np.cumsum([0, *(number.size for number in numbers)]), np.concatenate(numbers)
+
+    upright, sideways = moving(rails[0]), moving(*rails[1:])
+    upright_start, upright_column = numbered(upright)
+    sideways_start, sideways_column = numbered(sideways)
+    response = step_response(reduced, time_step(config))
+    middle = reduced.parameters.n_spans // 2
+    midspan = np.stack(
+        [_relative(reduced, middle, shape) for shape in (reduced.midspan_z, reduced.midspan_y)]
+    )
+    carried_start, carried_top, carried = _rows(reduced.carried)
+    stiffness_start, stiffness_top, stiffness = _rows(top_stiffness(reduced))
+    of_passage = stages(config, reduced)
+    always = np.logical_and.reduce([stage.stepped for stage in of_passage])
+    damping_start, damping_column, damping = _rows(
+        _whole_and_short(_stepped_damping(reduced, time_step(config)), always)
+    )
+    taken_start, taken_mode, taken = _rows(
+        _whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
+    )
+    return Line(
+        n_spans=reduced.parameters.n_spans,
+        span_length=reduced.parameters.span_length,
+        stride=_stride(reduced.parameters),
+        n_units=reduced.parameters.rail.units_per_span,
+        upright_start=upright_start,
+        upright=upright_column,
+        sideways_start=sideways_start,
+        sideways=sideways_column,
+        rail_z=stacked(rails[0], upright),
+        rail_roll=stacked(rails[1], sideways),
+        rail_y=stacked(rails[2], sideways),
+        square=reduced.stiffness.diagonal()[:n],
+        response=response[:n],
+        carried_start=carried_start,
+        carried_top=carried_top + n,
+        carried=carried,
+        stiffness_start=stiffness_start,
+        stiffness_top=stiffness_top + n,
+        stiffness=stiffness,
+        output_column=columns[middle],
+        midspan=midspan,
+        middle=middle,
+        rest=np.stack([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
+        damping_column=damping_column,
+        damping=damping,
+        taken_mode=taken_mode,
+        taken=taken,
+        stages=_stages(reduced, config, of_passage, damping_start, taken_start),
+    )
+
+
+def _relative(reduced: ReducedGuideway, span: int, shape: Array) -> Array:
+    """Motion (column, …) in a span when its modes count from where the pier tops take them."""
+    columns, own = reduced.span_coordinates[span], reduced.own_modes(span)
+    tops = columns[own.size :] - reduced.n_modes
+    carried = reduced.carried[own][:, tops]
+    return np.concatenate([shape[: own.size], shape[own.size :] + carried.T @ shape[: own.size]])
+
+
+def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array:
+    """Damping on the rates of the coordinates as stepped.
+
+    A mode's rate in a step, a central difference, is sinc(ωΔt) of its true one; its own damping
+    makes up for that.
+    """
+    damping = reduced.relative_damping.copy()
+    phase = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes]) * time_step
+    own = damping.diagonal()
+    own[: reduced.n_modes] /= np.sinc(phase / np.pi)
+    damping.setdiag(own)
+    return damping
+
+
+def _whole_and_short(matrix: sp.csr_array, always: npt.NDArray[np.bool_]) -> sp.csr_array:
+    """The rows of a matrix, then the same without the columns that are not stepped in all stages.
+
+    Short rows are those of quiet spans.
+    """
+    both = sp.vstack([matrix, matrix @ sp.diags_array(always.astype(float))]).tocsr()
+    both.eliminate_zeros()
+    return both
+
+
+def _stages(
+    reduced: ReducedGuideway,
+    config: Config,
+    of_passage: list[Stage],
+    damping_start: IntArray,
+    taken_start: IntArray,
+) -> Stages:
+    """What is stepped in each stage, and where its whole or short rows of damping and of what modes
+    take along begin and end."""
+    n = reduced.n_modes
+    starts, tops_from, stepped, rows = [0], [], [], []
+    factor_rows, factor_start, inverse = [], [0], []
+    stilled = []
+    before = np.zeros(reduced.n_coordinates, dtype=bool)
+    for stage in of_passage:
+        modes = np.flatnonzero(stage.stepped[:n])
+        tops, factor = stepped_mass(reduced, stage.stepped, time_step(config))
+        coordinates = np.concatenate([modes, tops])
+        stepped.append(coordinates)
+        rows.append(coordinates + np.where(stage.awake[coordinates], 0, reduced.n_coordinates))
+        tops_from.append(starts[-1] + modes.size)
+        starts.append(starts[-1] + coordinates.size)
+        factor_start += [factor_start[-1]] * modes.size
+        inverse.append(np.zeros(modes.size))
+        inverse.append(1.0 / np.diagonal(factor))
+        for k, row in enumerate(factor):
+            met = np.flatnonzero(row[:k])
+            factor_rows.append((tops[met], row[met]))
+            factor_start.append(factor_start[-1] + met.size)
+        stilled.append(np.flatnonzero(before & ~stage.stepped))
+        before = stage.stepped
+    row = np.concatenate(rows)
+    top_row = np.maximum(row % reduced.n_coordinates - n, 0)
+    top_row += np.where(row >= reduced.n_coordinates, reduced.n_coordinates - n, 0)
+    return Stages(
+        first_step=np.array([stage.first_step for stage in of_passage]),
+        start=np.array(starts),
+        tops=np.array(tops_from),
+        stepped=np.concatenate(stepped),
+        damping_from=damping_start[row],
+        damping_to=damping_start[row + 1],
+        taken_from=taken_start[top_row],
+        taken_to=taken_start[top_row + 1],
+        factor_start=np.array(factor_start),
+        factor_top=np.concatenate([top for top, _ in factor_rows]),
+        factor=np.concatenate([value for _, value in factor_rows]),
+        factor_inverse=np.concatenate(inverse),
+        stilled_start=np.cumsum([0, *(one.size for one in stilled)]),
+        stilled=np.concatenate(stilled),
+    )
+
+
+def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, Array]:
+    """Row starts, columns and values of a sparse matrix in order."""
+    rows = matrix.tocsr().sorted_indices()
+    return rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data
+
+
+def run(config: Config, record_every: int) -> Run:
+    passage = config.passage
+    dt = time_step(config)
+    return Run(
+        first_step=first_step(config),
+        n_steps=n_steps(config),
+        time_step=dt,
+        speed=passage.speed,
+        start=start(config),
+        train_length=config.train.length,
+        gap_contact=passage.gap_contact,
+        gap_lost=passage.gap_lost,
+        sections=np.ascontiguousarray(acceleration_filter(passage, dt)),
+        record_every=record_every,
+    )
+
+
+def empty_outcome(
+    train: train_model.TrainModel, kinds: tuple[MagnetRows, MagnetRows], run: Run
+) -> Outcome:
+    """Room for what a row of samples leaves behind, as for a train at rest."""
+    n_cars = train.parameters.n_cars
+    table = train.magnets
+    n_magnets = table.x.size
+    n_records = run.n_steps // run.record_every if run.record_every else 0
+    gap = np.array([[k.gap_reference] * LANES for k in kinds])
+    current = np.array([[k.current_reference] * LANES for k in kinds])
+    history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets, LANES))
+    of_kind = table.is_guidance.astype(np.int64)
+    history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]
+    history[:, -n_magnets:] = current[of_kind]
+    return Outcome(
+        extreme=np.zeros((4 + 2 * n_cars, LANES)),
+        extreme_time=np.zeros((4 + 2 * n_cars, LANES)),
+        gap_min=gap.copy(),
+        gap_max=gap.copy(),
+        current_max=current,
+        status=np.zeros(LANES, np.int64),
+        lost_time=np.full(LANES, np.nan),
+        lost_magnet=np.full(LANES, -1, np.int64),
+        at_loss=np.zeros((6, LANES)),
+        history=history,
+    )
