@@ -7,15 +7,17 @@ coupling.  Theory: docs/theory/integration.md, "Reference solver".
 
 from __future__ import annotations
 
+import logging
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from time import perf_counter
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
-from scipy.interpolate import CubicHermiteSpline, PPoly
+from scipy.interpolate import CubicHermiteSpline, CubicSpline, PPoly
 from scipy.signal import sosfilt
 from scipy.sparse.linalg import SuperLU, splu
 from tqdm import tqdm
@@ -27,7 +29,12 @@ from maglev.mechanics.control import circuits as grouping_of
 from maglev.mechanics.course import first_step, nose, time_step
 from maglev.mechanics.course import n_steps as whole_steps
 from maglev.mechanics.irregularity import Profile
-from maglev.mechanics.responses import Passages, acceleration_filter, checked_gains
+from maglev.mechanics.responses import (
+    GIRDER_RESPONSES,
+    Passages,
+    acceleration_filter,
+    checked_gains,
+)
 from maglev.parameters import Config
 
 Array = npt.NDArray[np.float64]
@@ -44,6 +51,24 @@ MOST_ITERATIONS = 30
 
 FRESH_TANGENT_EVERY = 6
 """Iterations after which the tangent of the magnets is taken anew, where they are [-]."""
+
+FIRST_STEP = 0.36e-3
+"""Longest first step [s]: 100 Hz, the upper end of the band, turn by 0.23 in it, which lengthens
+their period by 0.4 %; half of it leaves 0.1 %, the tolerance, before extrapolation."""
+
+MOST_HALVINGS = 5
+"""Halvings of the first step after which a passage is given up [-]."""
+
+ERROR = 1e-3
+"""Largest estimated error of an extreme, as a share of it [-]."""
+
+NEGLIGIBLE = 1e-3
+"""Share of the vertical extreme below which a lateral one is not resolved for its own sake [-]."""
+
+RESPONSES = (*GIRDER_RESPONSES, "car_body_acceleration_z", "car_body_acceleration_y")
+"""The six responses whose error is estimated."""
+
+_LOG = logging.getLogger(__name__)
 
 _GAUSS = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3)  # exact for cubics, the shapes of a beam
 
@@ -581,7 +606,6 @@ class System:
 def system(
     config: Config,
     model: guideway_model.GuidewayModel,
-    modal: guideway_model.ModalDamping,
     profile: Profile,
     gains: Array,
     step: float,
@@ -590,6 +614,8 @@ def system(
     train = train_model.build(config.train)
     poles = poles_of(train)
     mass = sp.csr_array(sp.diags_array(train.mass))
+    ratio, cutoff = config.guideway.damping_ratio, config.passage.mode_cutoff
+    modal = guideway_model.damping(model, ratio, cutoff)
     of_structure = modal.rate * model.mass + model.bearing_damping
     return System(
         config=config,
@@ -1007,8 +1033,9 @@ def passed(
     config: Config,
     profile: Profile,
     gains: Array,
+    step: float,
+    n_steps: int,
     *,
-    parts: int = 1,
     record_every: int = 0,
     progress: bool = False,
 ) -> Record:
@@ -1020,24 +1047,25 @@ def passed(
         Parameters of everything, and the track.
     gains : (sample, 8)
         From `checked_gains`.
-    parts
-        Steps in one of `maglev.mechanics.course.time_step`; time zero and the end stay.
+    step
+        Δt [s].
+    n_steps
+        Steps from the start of `maglev.mechanics.course` to the end [-].
     record_every
         Steps between recorded gaps and currents of magnets; zero records none.
     progress
         Show a progress bar.
     """
-    step = time_step(config) / parts
     model = guideway_model.build(config.guideway)
-    ratio, cutoff = config.guideway.damping_ratio, config.passage.mode_cutoff
-    of = system(config, model, guideway_model.damping(model, ratio, cutoff), profile, gains, step)
-    at, n_steps = watch(config, model, of.poles), parts * whole_steps(config)
+    of = system(config, model, profile, gains, step)
+    at = watch(config, model, of.poles)
     record = _blank(of, n_steps, n_steps // record_every if record_every else 0)
     state, fate = at_rest(of), record.fate
-    first = parts * (first_step(config) - 1)
+    first = int((first_step(config) - 1) * time_step(config) / step)  # until then nothing moves
     for number in tqdm(range(first, n_steps), disable=not progress, desc="reference", unit="step"):
-        state = stepped(of, state, (number + 1) * step, fate.status == 0)
-        _judge(fate, of, state, (number + 1) * step)
+        time = (number + 1) * step
+        state = stepped(of, state, time, fate.status == 0)
+        _judge(fate, of, state, time)
         if fate.status.all():
             break
         _note(record, number, record_every, of, at, state)
@@ -1059,22 +1087,19 @@ def integrate(
     profile: Profile,
     gains: npt.ArrayLike,
     *,
-    parts: int = 1,
     record_every: int = 0,
     progress: bool = False,
 ) -> tuple[Passages, Energy]:
-    """Run one passage per row of gains with one step length, its error unknown.
+    """Run one passage per row of gains with the step of the configuration, its error unknown.
 
     Parameters
     ----------
     config
-        Parameters of everything.
+        Parameters of everything; the step is `maglev.mechanics.course.time_step`.
     profile
         Track irregularity.
     gains : (sample, 4) or (sample, 8)
         As `maglev.mechanics.responses.checked_gains` takes them.
-    parts
-        Steps in one of `maglev.mechanics.course.time_step`.
     record_every
         Steps between recorded rows of the histories; zero records none.
     progress
@@ -1099,9 +1124,170 @@ def integrate(
     Newmark, J. Eng. Mech. Div. ASCE 85(EM3):67-94 (1959).
     """
     gains = checked_gains(gains, config.gains.further)
-    options = {"parts": parts, "record_every": record_every, "progress": progress}
-    record = passed(config, profile, gains, **options)
+    options = {"record_every": record_every, "progress": progress}
+    step, n_steps = time_step(config), whole_steps(config)
+    record = passed(config, profile, gains, step, n_steps, **options)
     return passages_of(record, record_every), energy_of(record)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What a passage of known error has taken.
+
+    Attributes
+    ----------
+    step, n_steps
+        The shortest step [s], and how many of them a passage has.
+    error : (sample, response)
+        Estimated error of the extremes, as a share of them [-]; NaN for lost samples.
+    seconds
+        Time on the clock [s].
+    """
+
+    step: float
+    n_steps: int
+    error: Array
+    seconds: float
+
+    @property
+    def attributes(self) -> dict[str, float | int]:
+        """For a dataset: the step, how many, the largest estimated error, the seconds."""
+        return {
+            "time_step": self.step,
+            "n_steps": self.n_steps,
+            "estimated_error": float(_worst(self.error).max()),
+            "seconds": self.seconds,
+        }
+
+
+def solve(
+    config: Config,
+    profile: Profile,
+    gains: npt.ArrayLike,
+    *,
+    tolerance: float = ERROR,
+    record_interval: float | None = None,
+    progress: bool = False,
+) -> tuple[Passages, Effort]:
+    """Run one passage per row of gains with steps halved until the extremes stay.
+
+    Newmark's rule is of second order, and so are the histories of a run: of two runs, with Δt and
+    Δt/2, a third of the difference is the error of the finer one and is taken off it.  That third
+    is also the estimate of what is left, until there are three runs: then what the third run has
+    changed is.
+
+    Parameters
+    ----------
+    config
+        Parameters of everything; ``passage.time_step`` only decides where the run starts.
+    profile
+        Track irregularity.
+    gains : (sample, 4) or (sample, 8)
+        As `maglev.mechanics.responses.checked_gains` takes them.
+    tolerance
+        Largest estimated error of an extreme, as a share of it [-].
+    record_interval
+        Time between recorded rows of the histories, at most [s]; none if not given.
+    progress
+        Show progress bars.
+
+    Returns
+    -------
+    passages
+        Extremes, outcomes and histories.
+    effort
+        The step it took, the estimated errors, the seconds.
+
+    Raises
+    ------
+    ValueError
+        If the gains have the wrong shape or are not finite.
+    RuntimeError
+        If a step does not converge, or if the error is above the tolerance with the shortest step.
+
+    References
+    ----------
+    Richardson, Phil. Trans. R. Soc. A 210:307-357 (1911).
+    """
+    began, gains = perf_counter(), checked_gains(gains, config.gains.further)
+    own = config.passage.model_copy(update={"time_step": FIRST_STEP})
+    step = time_step(config.model_copy(update={"passage": own}))
+    n_steps = math.ceil(whole_steps(config) * time_step(config) / step)
+    every = max(1, int(record_interval / step * (1 + 1e-9))) if record_interval else 0
+    coarse = passed(config, profile, gains, step, n_steps, record_every=every, progress=progress)
+    before = None
+    for halving in range(1, MOST_HALVINGS + 1):
+        n, h, rows = n_steps * 2**halving, step / 2**halving, every * 2**halving
+        fine = passed(config, profile, gains, h, n, record_every=rows, progress=progress)
+        better = extrapolated(coarse, fine)
+        error = _estimated_error(six_extremes(better), six_extremes(fine), before)
+        effort = Effort(h, n, error, perf_counter() - began)
+        _LOG.info("reference: %s", _told(effort))
+        if not (error > tolerance).any():
+            return passages_of(better, rows), effort
+        coarse, before = fine, six_extremes(better)
+    raise RuntimeError(
+        f"reference: expected errors of at most {100 * tolerance:g} %, got {_told(effort)}; "
+        "raw accelerations may have no limit: give passage.acceleration_band"
+    )
+
+
+def extrapolated(coarse: Record, fine: Record) -> Record:
+    """The responses of a run less a third of what they differ from a run with twice its step."""
+
+    def better(name: str) -> Array:
+        one, other = getattr(coarse, name), getattr(fine, name)
+        correction = (other[1::2] - one) / 3
+        return other + CubicSpline(coarse.time, correction)(fine.time)
+
+    lost = np.where(coarse.fate.status != 0, coarse.fate.status, fine.fate.status)
+    fate = replace(fine.fate, status=lost) if (lost != fine.fate.status).any() else fine.fate
+    changed = {name: better(name) for name in ("girder", "body_z", "body_y")}
+    return replace(fine, fate=fate, **changed)
+
+
+def six_extremes(record: Record) -> Array:
+    """Extremes (sample, response): girder as in `GIRDER_RESPONSES`, then largest of the cars."""
+    status = record.fate.status
+    girder, z, y = (
+        extremes(history, record.time, status)[0]
+        for history in (record.girder, record.body_z, record.body_y)
+    )
+    return np.column_stack([girder, z.max(axis=1), y.max(axis=1)])
+
+
+def _estimated_error(better: Array, fine: Array, before: Array | None) -> Array:
+    """Error of extrapolated extremes (sample, response), as a share of them.
+
+    Parameters
+    ----------
+    better, fine
+        With and without extrapolation.
+    before
+        Extrapolated from steps twice as long, if there were any.
+    """
+    error = np.abs(better - fine)
+    if before is not None:
+        error = np.maximum(error / 4, np.abs(better - before))
+    companion = better[:, [0, 0, 2, 2, 4, 4]]  # on smooth track nothing moves sideways
+    return error / np.maximum(better, NEGLIGIBLE * companion)
+
+
+def _told(effort: Effort) -> str:
+    """An effort in words."""
+    shares = ", ".join(
+        f"{name} {100 * worst:.2g} %"
+        for name, worst in zip(RESPONSES, _worst(effort.error), strict=True)
+    )
+    return (
+        f"estimated errors with a step of {1e3 * effort.step:.4g} ms: {shares} "
+        f"({effort.seconds:.0f} s)"
+    )
+
+
+def _worst(error: Array) -> Array:
+    """Largest error of each response over the samples that were not lost; 0 if all were."""
+    return np.where(np.isnan(error), 0.0, error).max(axis=0)
 
 
 def passages_of(record: Record, every: int) -> Passages:
