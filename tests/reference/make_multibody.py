@@ -29,15 +29,16 @@ REVOLUTE_X = [1, 1, 1, 0, 1, 1]
 class Cars:
     """Cars under construction; places: x ahead of the nose, y right, z below deck level."""
 
-    def __init__(self, train: Train, products_of_inertia: bool) -> None:
+    def __init__(self, train: Train) -> None:
         self.train = train
         self.system = exu.SystemContainer().AddSystem()
         self.ground = self.system.AddObject(eii.ObjectGround())
         self.place_of = {self.ground: np.zeros(3)}
         self.magnets: list[tuple[str, int, float, int]] = []  # kind, side, x, body
         self.c_frames: list[tuple[float, int]] = []  # x, body
+        self.n_frames = 8 * train.n_cars
         for number in range(train.n_cars):
-            self._add_car(-24.768 * (number + 0.5), products_of_inertia)
+            self._add_car(-24.768 * (number + 0.5))
         self._add_magnets()
 
     def body(self, place, mass, inertia, weight=0.0) -> int:
@@ -88,7 +89,13 @@ class Cars:
             )
         )
 
-    def _add_car(self, car_x: float, products_of_inertia: bool) -> None:
+    def riding(self, half, place, mass, along, weight=0.0) -> None:
+        """A mass that follows a C-frame in x and one other axis and stands still otherwise."""
+        lump = self.body(place, mass, 1e-3 * np.eye(3), weight)
+        self.joint(lump, half, place, [1, int(along == 1), int(along == 2), 0, 0, 0])
+        self.joint(lump, self.ground, place, [0, int(along != 1), int(along != 2), 1, 1, 1])
+
+    def _add_car(self, car_x: float) -> None:
         t = self.train
         bogie, rod, air = t.bogie, t.rod, t.air_spring
         p = t.car_body
@@ -102,35 +109,39 @@ class Cars:
         self.joint(body, self.ground, body_place, [1, 0, 0, 0, 0, 0])
         for bogie_x in (9.288, 3.096, -3.096, -9.288):
             centre = np.array([car_x + bogie_x, 0.0, 0.0])
-            # Two halves about one centre, free to roll against each other.
+            # A core without mass that does not roll; on it the two C-frames with half the bogie's
+            # mass each, turning about the height of all that moves sideways with them.
+            turning = 0.5 * bogie.c_frame_roll_inertia  # of each, in pitch and yaw
+            of_both = 2 * turning + bogie.mass * 1.548**2
+            inertia = np.diag([1.0, bogie.pitch_inertia - of_both, bogie.yaw_inertia - of_both])
+            core = self.body(centre, 0.0, inertia)
+            self.joint(core, self.ground, centre, [1, 0, 0, 1, 0, 0])
             halves = []
             for arm in (1.548, -1.548):
-                mass = 0.5 * bogie.mass
-                inertia = np.diag(
-                    [
-                        bogie.c_frame_roll_inertia,
-                        0.5 * bogie.pitch_inertia,
-                        0.5 * bogie.yaw_inertia,
-                    ]
+                place = centre + np.array([arm, 0, 0])
+                half = self.body(
+                    place,
+                    0.5 * bogie.mass,
+                    np.diag([bogie.c_frame_roll_inertia, turning, turning]),
+                    0.5 * bogie.mass * GRAVITY,
                 )
-                if not products_of_inertia:  # the rods' point masses, diagonal terms only
-                    for side in (1, -1):
-                        r = np.array([arm, side * rod.pivot_y, rod.pivot_z])
-                        inertia += rod.mass * np.diag(r @ r - r * r)
-                        mass += rod.mass
-                weight = (0.5 * bogie.mass + 2 * rod.mass) * GRAVITY
-                halves.append(self.body(centre, mass, inertia, weight))
-            self.joint(halves[0], self.ground, centre, [1, 0, 0, 0, 0, 0])
-            self.joint(halves[0], halves[1], centre, REVOLUTE_X)
+                halves.append(half)
+                number = len(self.c_frames)
+                ends = 1 if number in (0, self.n_frames - 1) else 2
+                self.c_frames.append((place[0], half))
+                of_magnets = t.suspension_magnet.mass * ends
+                sideways = 0.5 * bogie.mass + 2 * rod.mass + of_magnets
+                height = 2 * rod.mass * rod.pivot_z + of_magnets * t.suspension_magnet.z
+                axis = place + np.array([0, 0, height / sideways])
+                self.joint(half, core, axis, REVOLUTE_X)
             self.roll_spring(halves[0], halves[1], centre, bogie.roll_stiffness, bogie.roll_damping)
             for half, arm in zip(halves, (1.548, -1.548), strict=True):
                 x = centre[0] + arm
-                self.c_frames.append((x, half))
                 for side in (1, -1):
                     self.spring(half, body, [x, side * air.y, 0], 2, air.stiffness, air.damping)
                     pivot = np.array([x, side * rod.pivot_y, rod.pivot_z])
-                    mass = rod.mass if products_of_inertia else 0.0
-                    pendulum = self.body(pivot, mass, rod.inertia * np.eye(3))
+                    weight = rod.mass * GRAVITY
+                    pendulum = self.body(pivot, rod.mass, rod.inertia * np.eye(3), weight)
                     self.joint(pendulum, half, pivot, [1, 1, 1, 0, 0, 0])
                     self.joint(pendulum, self.ground, pivot, [0, 0, 0, 0, 1, 1])
                     self.roll_spring(pendulum, half, pivot, 0.0, rod.pivot_damping)
@@ -138,6 +149,8 @@ class Cars:
                     self.roll_spring(pendulum, self.ground, pivot, hanging, 0.0)
                     end = pivot + np.array([0, 0, rod.length])
                     self.spring(pendulum, body, end, 1, rod.end_stiffness, rod.end_damping)
+                    beside = [x, side * rod.pivot_y, t.lateral_damper.z]
+                    self.spring(half, body, beside, 1, 0.0, t.lateral_damper.damping)
 
     def _add_magnets(self) -> None:
         for kind in ("suspension", "guidance"):
@@ -154,6 +167,9 @@ class Cars:
                     for x_end, c_frame in ((x_front, front), (x_rear, rear)):
                         end = [x_end, side * p.y, p.z]
                         self.spring(c_frame, magnet, end, axis, p.end_stiffness, p.end_damping)
+                        other = 1 if axis == 2 else 2
+                        carried = 0.5 * p.mass * GRAVITY if other == 2 else 0.0
+                        self.riding(c_frame, end, 0.5 * p.mass, other, carried)
                     self.magnets.append((kind, side, x, magnet))
 
     def static_forces(self) -> tuple[np.ndarray, np.ndarray]:
@@ -179,6 +195,7 @@ class Cars:
         self.system.Assemble()
         settings = exu.SimulationSettings()
         settings.solution.file.write = False
+        settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
         self.system.SolveStatic(settings)
         values = np.array([[self.system.GetSensorValues(s) for s in pair] for pair in sensors])
         return values[:, 0, 2], values[:, 1, 1]
@@ -220,15 +237,11 @@ def modes(M, K, D) -> dict[str, list[float]]:
     }
 
 
-def reference(n_cars: int, products_of_inertia: bool = False) -> dict[str, list[float]]:
-    """Static forces and modes with the default parameters.
-
-    With ``products_of_inertia`` the rods ride on their pivots as bodies of their own; without, only
-    the diagonal of their inertia about the bogie's centre counts, as the model has it.
-    """
+def reference(n_cars: int) -> dict[str, list[float]]:
+    """Static forces and modes with the default parameters."""
     train, gains = Train(n_cars=n_cars), Gains()
-    force, moment = Cars(train, products_of_inertia).static_forces()
-    cars = Cars(train, products_of_inertia)
+    force, moment = Cars(train).static_forces()
+    cars = Cars(train)
     poles = []
     for number, (kind, *_) in enumerate(cars.magnets):
         if kind == "guidance":
