@@ -29,7 +29,7 @@ from maglev.parameters import Config
 from maglev.simulation import simulate
 from maglev.stages.points import case_of, gains_at, random_columns
 from maglev.stages.reads import TRAIN_ON_GUIDEWAY
-from maglev.vocabulary import GAINS
+from maglev.vocabulary import GAINS, STEP_TOO_LARGE
 
 _LOG = logging.getLogger(__name__)
 
@@ -51,9 +51,10 @@ def _code() -> str:
 
 
 def content(config: Config) -> dict[str, object]:
-    """All of a configuration that decides a run, beside its gains; files by their bytes."""
+    """All of a configuration that decides a run, beside its four gains; files by their bytes."""
     whole = config.quantities()
     part = {name: whole[name] for name in TRAIN_ON_GUIDEWAY}
+    part["further_gains"] = list(config.gains.further)
     profile = config.irregularity.profile_file
     if profile is not None:
         part["irregularity"] |= {"profile_file": f"sha256:{datasets.file_hash(profile)}"}
@@ -181,11 +182,24 @@ def _compute(
     else:
         computed = simulate(config, gains, n_threads=n_threads, track_seeds=seeds)
         computed["track_seed"] = (("sample",), seeds)
+    _refuse_too_large_steps(gains, computed)
     name = hashlib.sha256(b"".join(_row_keys(gains, seeds))).hexdigest()[:16]
     path = folder / f"{name}.nc"
     with _FILES:
         datasets.write(computed, path, "passage", config=content(config), code=_code())
     return path
+
+
+def _refuse_too_large_steps(gains: FloatArray, computed: xr.Dataset) -> None:
+    """Refuse to go on where the step is too large for the gains of a sample."""
+    too_fast = np.flatnonzero(computed["status"].to_numpy() == STEP_TOO_LARGE)
+    if too_fast.size:
+        first = ", ".join(f"{gain:.4g}" for gain in gains[too_fast[0]])
+        raise ValueError(
+            f"passage.time_step is too large for the gains of {too_fast.size} of "
+            f"{gains.shape[0]} samples, the first with {first}: motions would grow by the step "
+            "alone; take a smaller step"
+        )
 
 
 def _gathered(places: Sequence[tuple[Path, int]]) -> xr.Dataset:
