@@ -54,8 +54,8 @@ def _named_section(field: FieldInfo) -> type[Parameters] | None:
     """The parameter class of a field that holds sections by name, none for any other field."""
     if get_origin(field.annotation) is not Mapping:
         return None
-    section: type[Parameters] = get_args(field.annotation)[1]
-    return section
+    section = get_args(field.annotation)[1]
+    return section if isinstance(section, type) and issubclass(section, Parameters) else None
 
 
 def _extra(field: FieldInfo) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def _config_lines(
                 yield ""
             yield from _commented(f"{pad}{name}:", _summary(type(value)), pad)
             yield from _config_lines(value, _origins(field), indent + 1)
-        elif isinstance(value, Mapping):
+        elif isinstance(value, Mapping) and _named_section(field) is not None:
             yield ""
             yield from _commented(f"{pad}{name}:", field.description or "", pad)
             for k, (key, section) in enumerate(value.items()):
