@@ -100,6 +100,11 @@ class Stage:
         return self.name.replace("_", "-")
 
     @property
+    def code(self) -> str:
+        """Fingerprint of all the code that it computes with; how it is declared is none of it."""
+        return code_of(f"stages.{self.name}", without=["stage"])
+
+    @property
     def options(self) -> tuple[str, ...]:
         """Names of the options of its command, in order; see `flag`."""
         of = {"run": (), "case": ("case",), "method": ("case", "method")}[self.of]
@@ -223,7 +228,7 @@ class Stage:
             path,
             self.layout,
             config=self.slice(config, case, method),
-            code=code_of(f"stages.{self.name}"),
+            code=self.code,
             inputs={**self.files(config, case, method), **(inputs or {})},
         )
 
