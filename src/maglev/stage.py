@@ -344,22 +344,20 @@ def flag(name: str) -> str:
     return f"--{name.removeprefix('n_').replace('_', '-')}"
 
 
-def _declares(tree: ast.Module) -> bool:
-    return any(
-        isinstance(node, ast.Assign)
-        and any(isinstance(target, ast.Name) and target.id == "STAGE" for target in node.targets)
-        for node in tree.body
-    )
+def summary(name: str) -> str | None:
+    """First sentence of the module of a stage, which is not imported; none if there is no stage."""
+    path = _FOLDER / f"{name}.py"
+    tree = ast.parse(path.read_text(encoding="utf-8")) if path.is_file() else ast.Module([], [])
+    targets = [each for node in tree.body if isinstance(node, ast.Assign) for each in node.targets]
+    if not any(isinstance(each, ast.Name) and each.id == "STAGE" for each in targets):
+        return None
+    return (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
 
 
 def summaries() -> dict[str, str]:
-    """What each stage does, by its name: the first line of its module, which is not imported."""
-    found = {}
-    for path in sorted(_FOLDER.glob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        if _declares(tree):
-            found[path.stem] = (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
-    return found
+    """What each stage does, by its name."""
+    found = {path.stem: summary(path.stem) for path in sorted(_FOLDER.glob("*.py"))}
+    return {name: words for name, words in found.items() if words is not None}
 
 
 def named(name: str) -> Stage:
