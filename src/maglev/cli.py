@@ -190,7 +190,7 @@ def _files(stage: Stage, given: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for role, one in stage.inputs.items():
         value = given[role]
-        if role not in roles and value is not None:
+        if role not in roles and value:
             raise click.UsageError(f"the method {method} has no use for {flag(role)}")
         if one.by:
             found[role] = {
