@@ -326,9 +326,9 @@ def stage_tables() -> str:
         "change of any other key leaves its file as it is. `demonstration` is read by all.",
         "",
     ]
-    summary = summaries()
+    words = summaries()
     for name, stage in stages().items():
-        lines += [f"## `{name}`", "", summary[name], ""]
+        lines += [f"## `{name}`", "", words[name], ""]
         once = {"run": "run", "case": "case", "method": "case and method"}[stage.of]
         of = f" ({', '.join(stage.methods)})" if stage.methods != METHODS else ""
         lines += [f"One file a {once}{of}, layout [`{stage.layout}`](datasets.md).", ""]
