@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from maglev.mechanics import course, guideway, integrate, irregularity, reference
+from maglev.mechanics import (
+    course,
+    guideway,
+    integrate,
+    irregularity,
+    reference,
+    reference_magnets,
+)
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import n_steps, time_step, track_range
 from maglev.mechanics.responses import checked_gains
@@ -249,8 +256,8 @@ def test_a_short_face_sees_what_a_point_sees():
     seen = []
     for length in (1e-4, 0.0):
         train = train_model.build(with_faces(small(5), length).train)
-        poles = reference.poles_of(train)
-        rails = reference.Rails(model, poles)
+        poles = reference_magnets.poles_of(train)
+        rails = reference_magnets.Rails(model, poles)
         to_joint = np.abs((8.0 + poles.x) / 3.096 - np.round((8.0 + poles.x) / 3.096))
         rows = rails.under(8.0 + poles.x[None], 100.0, 1e-6)
         seen.append([(of @ (rails.ends @ x))[to_joint > 0.01] for of in rows])
@@ -276,8 +283,8 @@ def test_a_face_sees_the_mean_of_the_rail_and_its_rate():
     """Against a fine sum over the face, joints included, and against a difference in time."""
     config = small(5)
     model, train = guideway.build(config.guideway), train_model.build(config.train)
-    poles = reference.poles_of(train)
-    rails = reference.Rails(model, poles)
+    poles = reference_magnets.poles_of(train)
+    rails = reference_magnets.Rails(model, poles)
     x = np.random.default_rng(2).standard_normal(model.n_dof)
     speed, step, place = 100.0, 1e-9, 8.0 + poles.x
     mean, travel = rails.under(place[None], speed, step)
@@ -296,19 +303,19 @@ def test_a_face_sees_the_mean_of_the_rail_and_its_rate():
 
 def test_a_current_follows_a_ramp_of_its_command_exactly():
     lag, step = 2e-3, 0.3e-3
-    decay, newest = reference.lag_weights(lag, step)
+    decay, newest = reference_magnets.lag_weights(lag, step)
     time = step * np.arange(40)
     command, current = 7.0 * time, [0.0]
     for before, now in pairwise(command):
         current.append(decay * current[-1] + newest * now + (1 - decay - newest) * before)
     assert_allclose(current, 7.0 * (time - lag * (1 - np.exp(-time / lag))), atol=1e-15)
-    assert reference.lag_weights(0.0, step) == (0.0, 1.0)
+    assert reference_magnets.lag_weights(0.0, step) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.1e-3, 0.3e-3, 1e-3])
 def test_a_delayed_cubic_is_a_cubic(delay):
     step, now = 0.3e-3, 5e-3
-    taps = reference.delay_taps(delay, step)
+    taps = reference_magnets.delay_taps(delay, step)
     signal = sum(weight * (now - back * step) ** 3 for back, weight in taps.items())
     assert_allclose(signal, (now - delay) ** 3, rtol=1e-12)
     assert min(taps) >= 0
