@@ -11,7 +11,14 @@ import pytest
 import scipy.signal
 from numpy.testing import assert_allclose, assert_array_equal
 
-from maglev.mechanics import guideway, integrate, irregularity, reduction, responses
+from maglev.mechanics import (
+    guideway,
+    integrate,
+    irregularity,
+    reduction,
+    responses,
+    step_limit,
+)
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import n_steps, nose, time_step, track_range
 from maglev.mechanics.lanes import LANES
@@ -69,7 +76,7 @@ def limit_of(config):
     reduced = reduction.reduce(
         guideway.build(config.guideway), passage.mode_cutoff, passage.mode_cutoff_elsewhere
     )
-    return integrate.stability_limit(config, train_model.build(config.train), reduced)
+    return step_limit.stability_limit(config, train_model.build(config.train), reduced)
 
 
 def assert_same(one, other, samples=slice(None)):
