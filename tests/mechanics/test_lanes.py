@@ -162,9 +162,7 @@ def test_how_many_rows_are_taken_at_once_changes_no_bit():
             matrix, 0, n, other, 1, n, packed, 2, width, out[1], out[2], 0
         )
         target = np.ones((2 * n, LANES))
-        with_rows_at_once(_rows.project, wide)(
-            matrix, columns, 0, n, 3, width, out[0], 0, target
-        )
+        with_rows_at_once(_rows.project, wide)(matrix, columns, 0, n, 3, width, out[0], 0, target)
         results.append((out, target))
     assert_array_equal(results[0][0], results[1][0])
     assert_array_equal(results[0][1], results[1][1])
