@@ -200,8 +200,11 @@ CIRCUITS = {group: {"group": group} for group in GROUPS} | {
 @pytest.mark.slow
 @pytest.mark.parametrize("circuit", CIRCUITS)
 def test_both_solvers_agree_on_gains_drawn_at_random(circuit):
-    """Within 0.5 %, the reference right to 0.2 % and production with a quarter of its step."""
-    config = controlled(small(16, cutoff=300.0), **CIRCUITS[circuit])
+    """Within 0.5 %, the reference right to 0.2 %, production with modes to 2000 Hz and fine steps.
+
+    Modes up to 300 Hz, enough for spans of 25 m, leave up to 0.9 % on these of half the length.
+    """
+    config = controlled(small(39), **CIRCUITS[circuit])
     gains, profile = drawn(10), profile_of(config)
     found, effort = reference.solve(config, profile, gains, tolerance=2e-3)
     production = integrate.integrate(integrate.prepare(config, profile), gains)
