@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from maglev import datasets, profiles
+from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import n_steps, time_step, track_range
@@ -39,8 +40,9 @@ def simulate(
     ----------
     config
         Parameters of everything, from `maglev.load_config`.
-    gains : (sample, 4)
-        Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m].
+    gains : (sample, 4) or (sample, 8)
+        Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m]; then suspension k_a
+        [A s²/m], k_i [A/(m s)], guidance k_a, k_i, those of ``config.gains`` if left out.
     histories
         Whether to keep the time series of responses, gaps and currents.
     solver
@@ -60,7 +62,8 @@ def simulate(
         Layout ``passage`` of `maglev.datasets`: on ``sample`` the extremes of the six responses
         [m, m s-2] and their times [s], gaps [m], currents [A], ``status`` and where and when
         levitation was lost; with ``histories`` also the time series on ``t``.  The extremes of a
-        lost sample are NaN.  Attributes ``time_step`` [s] and ``n_steps``; of the reference solver
+        lost sample are NaN, as are those of a sample whose gains ask for a smaller step, which is
+        not judged (status ``step_too_large``).  Attributes ``time_step`` [s] and ``n_steps``; of the reference solver
         also ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
 
     Raises
@@ -85,7 +88,7 @@ def simulate(
     every = max(1, int(HISTORY_INTERVAL / time_step(config) * (1 + 1e-9))) if histories else 0
     if solver == "production":
         passages = integrate.integrate(
-            _system(config),
+            _system(config, _track_file_hash(config)),
             gains,
             profile_of=None if seeds is None else lambda k: track(config, seeds[k]),
             record_every=every,
@@ -142,8 +145,16 @@ def _checked_seeds(track_seeds: npt.ArrayLike, n_samples: int, solver: str) -> l
     return [int(seed) for seed in seeds]
 
 
+def _track_file_hash(config: Config) -> str:
+    """Hash of the measured irregularity; empty where there is none."""
+    irregularity = config.irregularity
+    name = irregularity.profile_file if irregularity.enabled else None
+    return file_hash(name) if name else ""
+
+
 @lru_cache(maxsize=2)
-def _system(config: Config) -> integrate.System:
+def _system(config: Config, _track_file: str) -> integrate.System:
+    """What passages of a configuration stand on, kept for the next call with the same track."""
     return integrate.prepare(config, track(config))
 
 

@@ -219,7 +219,7 @@ SHORT = {
     },
     "guideway": {"n_spans": 1, "span_length": "6.192 m", "rail": {"units_per_span": 2}},
     "irregularity": {"fade_in": "1 m", "vertical": {"law": "power", "coefficient": 2.3e-10}},
-    "passage": {"approach": "1 m", "speed": "1500 m/s", "acceleration_band": None},
+    "passage": {"approach": "1 m", "speed": "1500 m/s"},
 }
 """A very short and fast passage: steps by the tens."""
 
