@@ -46,7 +46,7 @@ from maglev.mechanics._kernels import (
 from maglev.mechanics._magnets import attract, circuits_at_rest, empty_magnet
 from maglev.mechanics._records import Motion, Rails
 from maglev.mechanics._rows import zeros
-from maglev.mechanics.course import first_step, n_steps, nose, start, time_step
+from maglev.mechanics.course import course
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Circuit, Config
 from maglev.simulation import _system, track
@@ -222,8 +222,8 @@ class Phase:
 
 def noses(system: integrate.System) -> Array:
     """Place of the nose at every step (step,) [m]."""
-    steps = np.arange(1, n_steps(system.config) + 1)
-    return nose(system.config, steps * time_step(system.config))
+    steps = np.arange(1, course(system.config).n_steps + 1)
+    return course(system.config).nose(steps * course(system.config).time_step)
 
 
 def rail_under_train(system: integrate.System) -> Array:
@@ -245,19 +245,19 @@ def poles_and_coefficients(system: integrate.System) -> tuple[int, float]:
     """Poles of the train, and the rail coefficients under all their faces in a mean step [-]."""
     poles, met = 0, 0
     for places in (system.suspension_places, system.guidance_places):
-        n = n_steps(system.config)
+        n = course(system.config).n_steps
         poles += 2 * places.number.size  # right and left
         # places follow each other, and so do their coefficients
         met += 2 * int(
             (places.start[places.number + n + 1] - places.start[places.number + 1]).sum()
         )
-    return poles, met / n_steps(system.config)
+    return poles, met / course(system.config).n_steps
 
 
 def steps_of_stages(system: integrate.System) -> Array:
     """Steps that each stage of the guideway lasts (stage,) [-]."""
     begins = system.line.stages.first_step
-    return np.diff([*begins, n_steps(system.config) + 1])
+    return np.diff([*begins, course(system.config).n_steps + 1])
 
 
 def operations(system: integrate.System) -> dict[str, float]:
@@ -268,7 +268,9 @@ def operations(system: integrate.System) -> dict[str, float]:
     # links: what they hang on 3, fused; stretch 2m - 1 and force back 2m for m coefficients
     links = 3 * vehicle.scaled_dof.size + 4 * vehicle.link_coefficient.size
     links -= vehicle.link_start.size - 1
-    moving = 1 - (first_step(system.config) - 1) / n_steps(system.config)  # the train rests before
+    moving = (
+        1 - (course(system.config).first_step - 1) / course(system.config).n_steps
+    )  # the train rests before
     # poles: gap error 3, its rate 3, gap 1, current 4, pull 3, force and moment 3, means 2;
     # a magnet: signs 4, force and moment on the train 6, means 2
     n_poles, n_under = poles_and_coefficients(system)
@@ -285,7 +287,7 @@ def operations(system: integrate.System) -> dict[str, float]:
     # guideway, of what is stepped: relative motion and its rate, forces back, stiffness, damping,
     # exact step, pier tops
     guideway, line_states, stages = 0.0, 0.0, line.stages
-    for stage, share in enumerate(steps / n_steps(system.config)):
+    for stage, share in enumerate(steps / course(system.config).n_steps):
         start, tops, stop = stages.start[stage], stages.tops[stage], stages.start[stage + 1]
         modes = stages.stepped[start:tops]
         carried = np.diff(line.carried_start)[modes].sum()
@@ -367,7 +369,7 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     """
     counted = operations(system)
     line, rng = system.line, np.random.default_rng(3)
-    vehicle, dt = system.vehicle, time_step(system.config)
+    vehicle, dt = system.vehicle, course(system.config).time_step
     n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
     n_rail = line.n_spans * line.stride
 
@@ -540,8 +542,8 @@ def reference_time(config: Config, seconds: float) -> Reference:
     """
     resting, _ = step_time(config, seconds / 2)
     running, steps = step_time(with_part(config, "passage", approach=1e-3), seconds)
-    before = int(-start(config) / config.passage.speed / time_step(config))
-    whole = resting * before + running * (n_steps(config) - before)
+    before = int(-course(config).start / config.passage.speed / course(config).time_step)
+    whole = resting * before + running * (course(config).n_steps - before)
     return Reference(resting, running, steps, whole)
 
 
@@ -655,7 +657,7 @@ def grown(configs: dict[int, Config]) -> list[Row]:
         prepared = time.process_time() - began
         gains = gains_of(config, LANES)
         run = timed(lambda system=system, gains=gains: integrate.integrate(system, gains))
-        rows.append(Row(size, run.process / LANES, n_steps(config), prepared))
+        rows.append(Row(size, run.process / LANES, course(config).n_steps, prepared))
         tell(f"  {size}: {rows[-1].cost:.3f} s a passage, prepared in {prepared:.2f} s")
     return rows
 
@@ -666,7 +668,7 @@ def batches(config: Config, counts: tuple[int, ...]) -> list[Row]:
     for count in counts:
         gains, begun = gains_of(config, count), time.process_time()
         passages = integrate.integrate(_system(config), gains)
-        rows.append(Row(count, time.process_time() - begun, n_steps(config)))
+        rows.append(Row(count, time.process_time() - begun, course(config).n_steps))
         if passages.status.any():
             raise RuntimeError(f"{np.count_nonzero(passages.status)} samples lost levitation")
         tell(f"  {count}: {rows[-1].cost:.2f} s, {rows[-1].cost / count:.3f} s a passage")
@@ -791,7 +793,7 @@ def measure(sizes: Sizes) -> Results:
     results.ceiling = ceiling(sizes)
     tell(f"  {results.ceiling.flops / 1e9:.1f} GFLOP/s, {results.ceiling.bytes / 1e9:.1f} GB/s")
     tell("phases")
-    results.phases = phases(system, results.per_passage / n_steps(config))
+    results.phases = phases(system, results.per_passage / course(config).n_steps)
     results.bytes = step_bytes(system)
     tell("reference solver")
     results.reference = reference_time(config, sizes.reference_seconds)
@@ -819,7 +821,7 @@ def table(head: list[str], rows: list[list[str]]) -> list[str]:
 
 def phase_rows(results: Results, config: Config) -> list[list[str]]:
     """Operations, time, rate and shares of every phase; whole step last."""
-    per_step = results.per_passage / n_steps(config)
+    per_step = results.per_passage / course(config).n_steps
     total = sum(p.operations for p in results.phases if p.seconds is not None)
     rows = []
     for phase in [*results.phases, Phase("**whole step**", total, per_step)]:
@@ -860,7 +862,7 @@ def page(results: Results, sizes: Sizes) -> str:
     longer = spans.get(20, most)
     many = [row for row in results.samples if row.size % LANES == 0 or row.size >= 10 * LANES]
     rate = results.phases and sum(p.operations for p in results.phases if p.seconds is not None)
-    rate = rate * n_steps(config) / results.per_passage
+    rate = rate * course(config).n_steps / results.per_passage
     base_wall = projected(results, results.per_passage, least.prepared)
     long_wall = projected(results, longer.cost, longer.prepared)
     n_most = results.samples[-1].size
@@ -874,10 +876,10 @@ def page(results: Results, sizes: Sizes) -> str:
         f"Python {platform.python_version()}, NumPy {np.__version__}.  The run took "
         f"{results.wall / 60:.1f} minutes.",
         f"Default configuration: {config.train.n_cars} cars, {config.guideway.n_spans} spans, "
-        f"{config.passage.speed * 3.6:.0f} km/h, {n_steps(config)} steps of "
-        f"{time_step(config) * 1e3:.3f} ms, modes to {config.passage.mode_cutoff:g} Hz at midspan "
-        f"and {config.passage.mode_cutoff_elsewhere:g} Hz elsewhere, rows of {LANES} samples.  "
-        "Seconds are process time on one core unless they are called wall.",
+        f"{config.passage.speed * 3.6:.0f} km/h, {course(config).n_steps} steps of "
+        f"{course(config).time_step * 1e3:.3f} ms, modes to {config.passage.mode_cutoff:g} Hz at "
+        f"midspan and {config.passage.mode_cutoff_elsewhere:g} Hz elsewhere, rows of {LANES} "
+        "samples.  Seconds are process time on one core unless they are called wall.",
         "",
         *(
             [
@@ -1001,7 +1003,7 @@ def page(results: Results, sizes: Sizes) -> str:
         "",
         f"One sample, same configuration: {results.reference.resting * 1e3:.2f} ms a step before "
         f"the guideway and {results.reference.running * 1e3:.2f} ms over the first "
-        f"{results.reference.steps} steps on it, extrapolated to {n_steps(config)} steps: "
+        f"{results.reference.steps} steps on it, extrapolated to {course(config).n_steps} steps: "
         f"{results.reference.passage:.0f} s.  A step grows slower as more of the train is on the "
         "guideway, so a whole passage takes longer than this.",
         "",

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import maglev
 from maglev import datasets
-from maglev.mechanics.course import n_steps, time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.parameters import Config
 from maglev.simulation import simulate
 
@@ -48,7 +48,7 @@ def test_the_dataset_has_the_layout_of_a_passage(with_histories):
     assert dict(with_histories.sizes)["car"] == 2
     assert with_histories.sizes["magnet"] == 2 * 30  # 14 a car and kind, 2 a coupling
     assert_allclose(with_histories["suspension_proportional_gain"], [3500, 3850])
-    assert with_histories.attrs["time_step"] == time_step(small(2, 3))
+    assert with_histories.attrs["time_step"] == course(small(2, 3)).time_step
     assert maglev.simulate is simulate
 
 
@@ -140,7 +140,7 @@ def test_any_number_of_cars_passes_any_number_of_spans(n_cars, n_spans):
     for name in datasets.RESPONSES:
         assert np.isfinite(passages[name]).all()
         assert passages[name] > 0
-        assert 0 < passages[f"{name}_t"] <= n_steps(config) * time_step(config)
+        assert 0 < passages[f"{name}_t"] <= course(config).n_steps * course(config).time_step
 
 
 @pytest.mark.parametrize(("n_cars", "n_spans"), [(1, 2), (6, 2)])

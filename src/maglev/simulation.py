@@ -14,7 +14,7 @@ from maglev import datasets, profiles
 from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import n_steps, time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile, profile
 from maglev.mechanics.responses import GIRDER_RESPONSES, Passages, checked_gains
 from maglev.parameters import Config
@@ -63,8 +63,9 @@ def simulate(
         [m, m s-2] and their times [s], gaps [m], currents [A], ``status`` and where and when
         levitation was lost; with ``histories`` also the time series on ``t``.  The extremes of a
         lost sample are NaN, as are those of a sample whose gains ask for a smaller step, which is
-        not judged (status ``step_too_large``).  Attributes ``time_step`` [s] and ``n_steps``; of the reference solver
-        also ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
+        not judged (status ``step_too_large``).  Attributes ``time_step`` [s] and ``n_steps``; of
+        the reference solver also ``estimated_error``, the largest of any extreme as a share of it,
+        and ``seconds``.
 
     Raises
     ------
@@ -85,7 +86,9 @@ def simulate(
     if solver not in ("production", "reference"):
         raise ValueError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
-    every = max(1, int(HISTORY_INTERVAL / time_step(config) * (1 + 1e-9))) if histories else 0
+    every = (
+        max(1, int(HISTORY_INTERVAL / course(config).time_step * (1 + 1e-9))) if histories else 0
+    )
     if solver == "production":
         passages = integrate.integrate(
             _system(config, _track_file_hash(config)),
@@ -161,7 +164,7 @@ def _system(config: Config, _track_file: str) -> integrate.System:
 def _dataset(
     config: Config, gains: npt.NDArray[np.float64], passages: Passages, histories: bool
 ) -> xr.Dataset:
-    one = ("sample",)
+    one, way = ("sample",), course(config)
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)
     }
@@ -203,5 +206,5 @@ def _dataset(
     return xr.Dataset(
         variables,
         coords=coordinates,
-        attrs={"time_step": time_step(config), "n_steps": n_steps(config)},
+        attrs={"time_step": way.time_step, "n_steps": way.n_steps},
     )

@@ -20,7 +20,7 @@ from maglev.mechanics import (
     step_limit,
 )
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import n_steps, nose, time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
 
@@ -78,7 +78,7 @@ def limit_of(config):
     )
     gains = np.array([*config.gains.as_row, *config.gains.further])
     of_train = step_limit.train_limit(step_limit.train_parts(config), gains)
-    return min(step_limit.guideway_limit(config, reduced, time_step(config)), of_train)
+    return min(step_limit.guideway_limit(config, reduced, course(config).time_step), of_train)
 
 
 def assert_same(one, other, samples=slice(None)):
@@ -206,7 +206,7 @@ def closed_linearly(config, duration, step):
             damper = force * k_d[guides] / kind.current_reference
             stiffness += spring * np.outer(at, at)
             damping += damper * np.outer(at, at)
-            place = nose(config, time) + magnets.x[m] + dx
+            place = course(config).nose(time) + magnets.x[m] + dx
             value, slope = irregularity.displacement(track, place)
             push += np.outer(spring * value[row] + damper * config.passage.speed * slope[row], at)
     per_mass = np.diag(1 / train.mass)
@@ -225,7 +225,7 @@ def test_small_motion_on_rigid_track_is_that_of_linear_magnets(amplitude, agree)
     )
     found = passed(config, record_every=1)
     duration = config.passage.approach / config.passage.speed
-    time, expected = closed_linearly(config, duration, time_step(config))
+    time, expected = closed_linearly(config, duration, course(config).time_step)
     n = time.size - 1
     errors = []
     for history, linear in zip((found.body_z_history, found.body_y_history), expected, strict=True):
@@ -286,7 +286,7 @@ def at_step(step, cutoff):
         mode_cutoff=f"{cutoff} Hz",
         mode_cutoff_elsewhere="300 Hz",
     )
-    assert_allclose(time_step(config), step, rtol=1e-9)
+    assert_allclose(course(config).time_step, step, rtol=1e-9)
     return config
 
 
@@ -324,7 +324,7 @@ def test_gains_below_the_static_limit_lose_levitation_and_their_neighbours_do_no
     lost = found.lost_magnet[1]
     magnets = system_of(config).train.magnets
     assert not magnets.is_guidance[lost]
-    assert 0 < found.lost_time[1] <= n_steps(config) * time_step(config)
+    assert 0 < found.lost_time[1] <= course(config).n_steps * course(config).time_step
     for name in ("girder", "girder_time", "body_z", "body_y", "body_z_time", "body_y_time"):
         assert np.isnan(getattr(found, name)[1]).all(), name
     assert np.all(found.status[[0, 2]] == 0)

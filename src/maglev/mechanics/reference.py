@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import first_step, time_step
+from maglev.mechanics.course import course
 from maglev.mechanics.course import n_steps as whole_steps
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.reference_magnets import Poles
@@ -310,7 +310,8 @@ def passed(
     at = watch(config, model, of.poles)
     record = _blank(of, n_steps, n_steps // record_every if record_every else 0)
     state, fate = at_rest(of), record.fate
-    first = int((first_step(config) - 1) * time_step(config) / step)  # until then nothing moves
+    way = course(config)
+    first = int((way.first_step - 1) * way.time_step / step)  # until then nothing moves
     bar = tqdm(total=n_steps - first, disable=not progress, desc="reference", unit="step")
     for number, view in enumerate(views(of, first, n_steps), start=first):
         state = stepped(of, state, view, fate.status == 0)
@@ -381,7 +382,7 @@ def integrate(
         config,
         profile,
         gains,
-        time_step(config),
+        course(config).time_step,
         whole_steps(config),
         record_every=record_every,
         energy=True,
@@ -471,8 +472,8 @@ def solve(
     """
     began, gains = perf_counter(), checked_gains(gains, config.gains.further)
     own = config.passage.model_copy(update={"time_step": FIRST_STEP})
-    step = time_step(config.model_copy(update={"passage": own}))
-    n_steps = math.ceil(whole_steps(config) * time_step(config) / step)
+    step = course(config.model_copy(update={"passage": own})).time_step
+    n_steps = math.ceil(whole_steps(config) * course(config).time_step / step)
     every = max(1, int(record_interval / step * (1 + 1e-9))) if record_interval else 0
     coarse = passed(config, profile, gains, step, n_steps, record_every=every, progress=progress)
     before = None
