@@ -107,7 +107,7 @@ ROOT = Path(__file__).parents[1]
         (
             "cases: {New: {}}",
             "cases.New cannot name a case: use small letters, digits and underscores, and none "
-            "of config, track, guideway, figures, tables, checks, report",
+            "of config, track, guideway, train, figures, tables, checks, report",
         ),
         (
             "study: {asm_paper: {response: girder}}",

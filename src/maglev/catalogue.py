@@ -54,8 +54,8 @@ def _named_section(field: FieldInfo) -> type[Parameters] | None:
     """The parameter class of a field that holds sections by name, none for any other field."""
     if get_origin(field.annotation) is not Mapping:
         return None
-    section: type[Parameters] = get_args(field.annotation)[1]
-    return section
+    section = get_args(field.annotation)[1]
+    return section if isinstance(section, type) and issubclass(section, Parameters) else None
 
 
 def _extra(field: FieldInfo) -> dict[str, Any]:
@@ -108,7 +108,7 @@ def _config_lines(
                 yield ""
             yield from _commented(f"{pad}{name}:", _summary(type(value)), pad)
             yield from _config_lines(value, _origins(field), indent + 1)
-        elif isinstance(value, Mapping):
+        elif isinstance(value, Mapping) and _named_section(field) is not None:
             yield ""
             yield from _commented(f"{pad}{name}:", field.description or "", pad)
             for k, (key, section) in enumerate(value.items()):
@@ -326,9 +326,9 @@ def stage_tables() -> str:
         "change of any other key leaves its file as it is. `demonstration` is read by all.",
         "",
     ]
-    summary = summaries()
+    words = summaries()
     for name, stage in stages().items():
-        lines += [f"## `{name}`", "", summary[name], ""]
+        lines += [f"## `{name}`", "", words[name], ""]
         once = {"run": "run", "case": "case", "method": "case and method"}[stage.of]
         of = f" ({', '.join(stage.methods)})" if stage.methods != METHODS else ""
         lines += [f"One file a {once}{of}, layout [`{stage.layout}`](datasets.md).", ""]

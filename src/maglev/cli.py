@@ -30,14 +30,12 @@ class _Commands(click.Group):
         return sorted({*self.commands, *(name.replace("_", "-") for name in summaries())})
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        from maglev.stage import named, summaries
+        from maglev.stage import named, summary
 
         if name in self.commands:
             return self.commands[name]
         module = name.replace("-", "_")
-        if "_" in name or module not in summaries():
-            return None
-        return _command(named(module))
+        return None if "_" in name or summary(module) is None else _command(named(module))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands with a line each, without importing what stages compute with."""
@@ -108,7 +106,7 @@ def figure(name: str, data: tuple[Path, ...], out: Path) -> None:
 
 def _command(stage: Stage) -> click.Command:
     """The command of a stage: what it asks for follows from the declaration."""
-    from maglev.stage import flag, summaries
+    from maglev.stage import flag, summary
 
     def option(name: str, kind: Any, words: str, **more: Any) -> click.Option:
         settings = {"type": kind, "help": words, "required": True} | more
@@ -140,8 +138,8 @@ def _command(stage: Stage) -> click.Command:
         elif name not in ("case", "method"):
             options.append(option(name, kind, f"Which {name}."))
     options.append(option("out", _File, "NetCDF file to write."))
-    summary = summaries()[stage.name]
-    return click.Command(stage.command, params=options, help=summary, callback=_run(stage))
+    words = summary(stage.name)
+    return click.Command(stage.command, params=options, help=words, callback=_run(stage))
 
 
 def _run(stage: Stage) -> Callable[..., None]:
@@ -204,7 +202,7 @@ def _files(stage: Stage, given: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for role, one in stage.inputs.items():
         value = given[role]
-        if role not in roles and value is not None:
+        if role not in roles and value:
             raise click.UsageError(f"the method {method} has no use for {flag(role)}")
         if one.by:
             found[role] = {

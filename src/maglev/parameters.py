@@ -282,8 +282,8 @@ class Rod(Parameters):
     )
     end_damping: float = quantity(
         "N s/m",
-        "lower end to car body, lateral, in series with the pendulum",
-        0.0,
+        "lower end to car body, lateral, in series with the pendulum; keeps the rod from ringing",
+        300,
         source="A",
         confidence="L",
         minimum=0,
@@ -1206,6 +1206,11 @@ def _normal_cdf(u: float) -> float:
     return 0.5 * math.erfc(-u / math.sqrt(2.0))
 
 
+RAW_CUTOFF, RAW_STEP = 2000.0, 0.06e-3
+"""Mode cut-off [Hz] and step [s] from which raw girder accelerations are within 1 % of their limit;
+measured, docs/convergence.md."""
+
+
 class Config(Parameters):
     """Everything a run is made of."""
 
@@ -1390,6 +1395,17 @@ class Config(Parameters):
                     "the rail's joints, and the raw acceleration has no limit as step and cut-off "
                     "are refined; give a pole_length or a band"
                 )
+        passage = self.passage
+        if passage.acceleration_band is None and (
+            passage.mode_cutoff < RAW_CUTOFF or passage.time_step > RAW_STEP * (1 + 1e-9)
+        ):
+            raise ValueError(
+                "passage.acceleration_band: null (raw accelerations) needs passage.mode_cutoff of "
+                f"at least {RAW_CUTOFF:g} Hz and passage.time_step of at most "
+                f"{RAW_STEP * 1e3:g} ms, got {passage.mode_cutoff:g} Hz and "
+                f"{passage.time_step * 1e3:g} ms: coarser, they are a property of the cut-off and "
+                "the step, not of the bridge; refine both or give a band"
+            )
         if self.irregularity.fade_in > self.passage.approach:
             raise ValueError(
                 f"irregularity.fade_in must not exceed passage.approach = "

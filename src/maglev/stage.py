@@ -100,6 +100,11 @@ class Stage:
         return self.name.replace("_", "-")
 
     @property
+    def code(self) -> str:
+        """Fingerprint of all the code that it computes with; how it is declared is none of it."""
+        return code_of(f"stages.{self.name}", without=["stage"])
+
+    @property
     def options(self) -> tuple[str, ...]:
         """Names of the options of its command, in order; see `flag`."""
         of = {"run": (), "case": ("case",), "method": ("case", "method")}[self.of]
@@ -228,7 +233,7 @@ class Stage:
             path,
             self.layout,
             config=self.slice(config, case, method),
-            code=code_of(f"stages.{self.name}"),
+            code=self.code,
             inputs={**self.files(config, case, method), **(inputs or {})},
         )
 
@@ -348,22 +353,20 @@ def flag(name: str) -> str:
     return f"--{name.removeprefix('n_').replace('_', '-')}"
 
 
-def _declares(tree: ast.Module) -> bool:
-    return any(
-        isinstance(node, ast.Assign)
-        and any(isinstance(target, ast.Name) and target.id == "STAGE" for target in node.targets)
-        for node in tree.body
-    )
+def summary(name: str) -> str | None:
+    """First sentence of the module of a stage, which is not imported; none if there is no stage."""
+    path = _FOLDER / f"{name}.py"
+    tree = ast.parse(path.read_text(encoding="utf-8")) if path.is_file() else ast.Module([], [])
+    targets = [each for node in tree.body if isinstance(node, ast.Assign) for each in node.targets]
+    if not any(isinstance(each, ast.Name) and each.id == "STAGE" for each in targets):
+        return None
+    return (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
 
 
 def summaries() -> dict[str, str]:
-    """What each stage does, by its name: the first line of its module, which is not imported."""
-    found = {}
-    for path in sorted(_FOLDER.glob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        if _declares(tree):
-            found[path.stem] = (ast.get_docstring(tree) or "").split("\n\n")[0].replace("\n", " ")
-    return found
+    """What each stage does, by its name."""
+    found = {path.stem: summary(path.stem) for path in sorted(_FOLDER.glob("*.py"))}
+    return {name: words for name, words in found.items() if words is not None}
 
 
 def named(name: str) -> Stage:

@@ -14,8 +14,10 @@ from maglev.mechanics import (
     guideway,
     integrate,
     irregularity,
+    packing,
     reduction,
 )
+from maglev.mechanics._records import Motion
 from maglev.mechanics.course import first_step, n_steps, nose, start, time_step, track_range
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
@@ -125,14 +127,14 @@ def stepped_periods(step):
     reduced = reduction.reduce(
         guideway.build(config.guideway), passage.mode_cutoff, passage.mode_cutoff_elsewhere
     )
-    line, n = integrate._line(reduced, config), reduced.n_coordinates
+    line, n = packing.line(reduced, config), reduced.n_coordinates
     operator = np.zeros((n, n))
     for first in range(0, n, LANES):
-        x, velocity, force = (_kernels.zeros(n) for _ in range(3))
+        motion = _kernels.at_rest(n)
         columns = np.arange(first, min(first + LANES, n))
-        x[columns, columns - first] = 1.0
-        _kernels._line_acceleration(line, 0, x, velocity, force)
-        operator[:, columns] = -force[:, : columns.size]
+        motion.position[columns, columns - first] = 1.0
+        _kernels._answer(line, 0, motion)
+        operator[:, columns] = -motion.force[:, : columns.size]
     squares = np.sort(np.linalg.eigvals(operator).real)
     found = 2 / step * np.arcsin(step / 2 * np.sqrt(squares))
     exact = scipy.linalg.eigvalsh(reduced.stiffness.toarray(), reduced.mass.toarray())
@@ -180,8 +182,8 @@ def test_coordinates_that_fall_quiet_are_left_at_rest():
     ends = np.flatnonzero(np.diff(stages.stilled_start))
     assert ends.size > 3
     for stage in ends:
-        arrays = [np.ones((n, LANES)) for _ in range(5)]
-        _kernels._still(stages, stage, *arrays)
+        arrays = Motion(*(np.ones((n, LANES)) for _ in range(5)))
+        _kernels._still(stages, stage, arrays)
         stilled = stages.stilled[stages.stilled_start[stage] : stages.stilled_start[stage + 1]]
         assert np.all(stilled < reduced_line().n_modes)
         for array in arrays:
@@ -215,7 +217,7 @@ def test_the_train_rests_until_it_meets_the_track():
     profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
     gains = np.array([config.gains.as_row])
     found = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
-    with mock.patch.object(integrate, "first_step", lambda _: 1):
+    with mock.patch.object(packing, "first_step", lambda _: 1):
         whole = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
     first = first_step(config)
     assert nose(config, (first + 1) * time_step(config)) > -10.0

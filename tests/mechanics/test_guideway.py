@@ -153,6 +153,17 @@ def test_a_pier_weighs_its_volume(model):
     assert_allclose(mass, 2551 * (1.8 * 3.0 * 1 + 1.8 * 1.8 * (9 - 2 / 3)), rtol=1e-12)
 
 
+def test_a_pier_turns_about_its_axis_with_the_inertia_of_its_volume(model):
+    turn = np.where(model.component == YAW, 1.0, 0.0)
+    dof = np.concatenate([model.pier_top_dof[2], model.pier_dof[2]])
+    inertia = turn[dof] @ (model.mass[dof][:, dof] @ turn[dof])
+    cap, shaft = (
+        1.8 * 3.0 * (1.8**2 + 3.0**2) / 12,
+        1.8**2 * 2 * 1.8**2 / 12,
+    )  # per metre and density
+    assert_allclose(inertia, 2551 * (cap + shaft * (9 - 2 / 3)), rtol=1e-12)
+
+
 @pytest.mark.parametrize("component", [X, Y, Z])
 def test_the_guideway_moved_as_a_rigid_body_has_its_whole_mass(model, component):
     motion = np.where(model.component == component, 1.0, 0.0)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from maglev.mechanics import _kernels, integrate, irregularity
+from maglev.mechanics import _kernels, _rows, integrate, irregularity, packing
 from maglev.mechanics.course import n_steps, track_range
 from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, minimum, store
 from maglev.parameters import Config
@@ -134,7 +134,7 @@ def test_an_entry_is_that_of_the_array_as_it_lies():
 
 @pytest.mark.parametrize("n_rows", [1, 7, 64])
 def test_rows_of_the_kernels_begin_where_a_cache_line_does(n_rows):
-    rows = _kernels.zeros(n_rows)
+    rows = _rows.zeros(n_rows)
     assert rows.shape == (n_rows, LANES)
     assert not rows.any()
     assert rows.ctypes.data % 64 == 0
@@ -157,14 +157,12 @@ def test_how_many_rows_are_taken_at_once_changes_no_bit():
     results = []
     for wide in (False, True):
         out = np.zeros((4, width, LANES))
-        with_rows_at_once(_kernels._transform, wide)(matrix, 0, n, packed, 2, 0, width, out[0], 0)
-        with_rows_at_once(_kernels._transform_both, wide)(
+        with_rows_at_once(_rows.transform, wide)(matrix, 0, n, packed, 2, 0, width, out[0], 0)
+        with_rows_at_once(_rows.transform_both, wide)(
             matrix, 0, n, other, 1, n, packed, 2, width, out[1], out[2], 0
         )
         target = np.ones((2 * n, LANES))
-        with_rows_at_once(_kernels._project, wide)(
-            matrix, columns, 0, n, 3, width, out[0], 0, target
-        )
+        with_rows_at_once(_rows.project, wide)(matrix, columns, 0, n, 3, width, out[0], 0, target)
         results.append((out, target))
     assert_array_equal(results[0][0], results[1][0])
     assert_array_equal(results[0][1], results[1][1])
@@ -185,19 +183,20 @@ def test_a_peak_between_two_steps_is_kept_with_its_time(frequency):
     config = Config()
     profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
     system = integrate.prepare(config, profile)
-    outcome = integrate._empty_outcome(system, integrate._run(config, 0))
+    kinds = (system.suspension, system.guidance)
+    outcome = packing.empty_outcome(system.train, kinds, packing.run(config, 0))
 
     def motion(step):
         ahead = step * dt - crest
         return -np.cos(2 * np.pi * frequency * ahead) * np.exp(-((ahead / 0.02) ** 2))
 
-    recent, largest = _kernels.zeros(2), np.zeros(LANES)
-    recent[:] = motion(-1), motion(0)
+    watch, largest = _kernels._new_watch(1, 1, 1), np.zeros(LANES)
+    watch.recent[:] = motion(-1), motion(0)
     for step in range(1, 81):
         largest = np.maximum(largest, np.abs(motion(step)))
-        row = _kernels.zeros(1)
+        row = _rows.zeros(1)
         row[0] = motion(step)
-        keep_peak(outcome, recent, row, step * dt, dt)
+        keep_peak(outcome, watch, row, step * dt, dt)
     error = np.abs(outcome.extreme[0] - 1.0)
     assert error.max() < 0.03 * (1 - largest).max() + 2e-6
     period = 1 / frequency
@@ -206,8 +205,8 @@ def test_a_peak_between_two_steps_is_kept_with_its_time(frequency):
 
 
 @numba.njit
-def keep_peak(outcome, recent, row, time, dt):
-    _kernels._keep_peak(outcome, recent, 0, load(row, 0), time, dt)
+def keep_peak(outcome, watch, row, time, dt):
+    _kernels._keep_peak(outcome, watch, 0, load(row, 0), time, dt)
 
 
 SHORT = {

@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose
 from scipy.sparse.linalg import spsolve
 
 from maglev.mechanics import guideway as full
-from maglev.mechanics.integrate import step_response
 from maglev.mechanics.reduction import rail_weights, reduce, standing_sag
+from maglev.mechanics.step_limit import step_response
 from maglev.parameters import Bearing, Guideway, Passage
 
 CUTOFF, ELSEWHERE = Passage().mode_cutoff, Passage().mode_cutoff_elsewhere

@@ -1,73 +1,110 @@
 """Passages of the reference solver, stored for comparison with the production solver.
 
-Run as ``python tests/reference/make_passages.py [speed_kmh track]``: without arguments all four
-passages (some hours on one core), with arguments one of them, such as ``430 smooth``.  Each takes
-three sets of gains; the passage at 430 km/h over irregular track is that of the default train and
-guideway, the others are of two cars over three spans.  Newmark's rule lengthens a period by about
-(ωΔt)²/12: 0.05 % at 100 Hz, the upper end of the band, with a step of 0.12 ms.
+Run as ``python tests/reference/make_passages.py [name]``: without arguments all passages, with the
+name of one, such as ``430_smooth``, that one.  `430_irregular` is the default train and guideway at
+full size, the others are of two cars over three spans.  All take the same ten sets of gains, drawn
+as the study draws them, and are right to the tolerance that each file states.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from maglev.mechanics import irregularity, reference
 from maglev.mechanics.course import track_range
 from maglev.parameters import Config
 
 HERE = Path(__file__).parent
-GAIN_FACTORS = np.array([[1.0, 1.0, 1.0, 1.0], [0.85, 1.2, 0.9, 1.1], [1.2, 0.85, 1.1, 0.9]])
-"""Gains of the three samples as shares of the means [-]."""
+
+COV, SEED, N_SETS = 0.10, 20, 10
+"""Spread of the gains [-], seed of their drawing, how many sets."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a stored passage is of.
+
+    Attributes
+    ----------
+    speed_kmh
+        Speed [km/h].
+    irregular
+        Whether the track is.
+    n_cars, n_spans
+        Size of train and guideway [-].
+    control
+        Of both kinds of magnet, as `maglev.parameters.Circuit` takes it; the default if empty.
+    """
+
+    speed_kmh: int
+    irregular: bool = True
+    n_cars: int = 2
+    n_spans: int = 3
+    control: tuple[tuple[str, str], ...] = ()
+
 
 PASSAGES = {
-    (430, "irregular"): (5, 5, 0.12e-3),
-    (430, "smooth"): (2, 3, 0.12e-3),
-    (200, "irregular"): (2, 3, 0.12e-3),
-    (200, "smooth"): (2, 3, 0.12e-3),
+    "430_irregular": Case(430, n_cars=5, n_spans=5),
+    "430_smooth": Case(430, irregular=False),
+    "200_irregular": Case(200),
+    "200_smooth": Case(200, irregular=False),
+    "430_ends": Case(430, control=(("group", "ends"),)),
+    "430_half": Case(430, control=(("group", "half"),)),
+    "430_lumped": Case(430, control=(("group", "lumped"),)),
+    "430_late": Case(430, control=(("lag", "2 ms"), ("delay", "1 ms"))),
 }
-"""Speed [km/h] and track of each stored passage: its cars, its spans, its largest step [s]."""
+"""The stored passages."""
 
 
-def configuration(speed_kmh: int, track: str) -> Config:
+def configuration(name: str) -> Config:
     """The configuration of a stored passage, with the default time step."""
-    n_cars, n_spans, _ = PASSAGES[speed_kmh, track]
+    case = PASSAGES[name]
+    control = {kind: dict(case.control) for kind in ("suspension", "guidance")}
     return Config.model_validate(
         {
-            "train": {"n_cars": n_cars},
-            "guideway": {"n_spans": n_spans},
-            "passage": {"speed": f"{speed_kmh} km/h"},
-            "irregularity": {"enabled": track == "irregular"},
+            "train": {"n_cars": case.n_cars},
+            "guideway": {"n_spans": case.n_spans},
+            "passage": {"speed": f"{case.speed_kmh} km/h"},
+            "irregularity": {"enabled": case.irregular},
         }
+        | ({"control": control} if case.control else {})
     )
 
 
-def path(speed_kmh: int, track: str) -> Path:
+def drawn_gains(config: Config) -> npt.NDArray[np.float64]:
+    """Gains (sample, 4), normal about the means."""
+    normal = np.random.default_rng(SEED).standard_normal((N_SETS, 4))
+    return np.array(config.gains.as_row) * (1 + COV * normal)
+
+
+def path(name: str) -> Path:
     """File of one stored passage."""
-    return HERE / f"passage_{speed_kmh}_{track}.json"
+    return HERE / f"passage_{name}.json"
 
 
-def store(speed_kmh: int, track: str) -> None:
+def store(name: str) -> None:
     """Compute and store one passage."""
-    config = configuration(speed_kmh, track)
-    n_cars, n_spans, step = PASSAGES[speed_kmh, track]
-    fine = config.model_copy(
-        update={"passage": config.passage.model_copy(update={"time_step": step})}
-    )
-    gains = np.array(config.gains.as_row) * GAIN_FACTORS
+    config, case = configuration(name), PASSAGES[name]
+    gains = drawn_gains(config)
     profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
-    passages, energy = reference.integrate(fine, profile, gains, progress=True)
-    work = energy.work_on_train + energy.work_on_guideway
+    passages, effort = reference.solve(config, profile, gains, progress=True)
     record = {
         "made_by": "tests/reference/make_passages.py",
-        "speed_kmh": speed_kmh,
-        "track": track,
-        "n_cars": n_cars,
-        "n_spans": n_spans,
-        "time_step": step,
+        "speed_kmh": case.speed_kmh,
+        "irregular": case.irregular,
+        "n_cars": case.n_cars,
+        "n_spans": case.n_spans,
+        "control": dict(case.control),
+        "tolerance": reference.ERROR,
+        "time_step": effort.step,
+        "error": effort.error.tolist(),
         "gains": gains.tolist(),
         "girder": passages.girder.tolist(),
         "car_body_z": passages.body_z.tolist(),
@@ -76,13 +113,11 @@ def store(speed_kmh: int, track: str) -> None:
         "gap_max": passages.gap_max.tolist(),
         "current_max": passages.current_max.tolist(),
         "status": passages.status.tolist(),
-        "energy_work": np.abs(work).max(axis=0).tolist(),
-        "energy_residual": np.abs(work - energy.dissipated - energy.stored).max(axis=0).tolist(),
     }
-    path(speed_kmh, track).write_text(json.dumps(record, indent=1) + "\n")
+    path(name).write_text(json.dumps(record, indent=1) + "\n")
 
 
 if __name__ == "__main__":
-    chosen = [(int(sys.argv[1]), sys.argv[2])] if len(sys.argv) == 3 else list(PASSAGES)
-    for speed, track in chosen:
-        store(speed, track)
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    for passage in sys.argv[1:] or PASSAGES:
+        store(passage)

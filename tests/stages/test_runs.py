@@ -72,6 +72,16 @@ def test_the_store_knows_the_track_of_a_run(train, tmp_path):
     assert train.n_runs == 3  # the track of the configuration is another one
 
 
+def test_a_file_of_the_store_that_was_replaced_is_read_again(train, tmp_path):
+    gains = np.array([config().gains.as_row])
+    for folder, scale in (("store", 1.0), ("other", 1.1)):
+        stored_runs(config(), scale * gains, tmp_path / folder)
+    (kept,), (other,) = (list((tmp_path / name).rglob("*.nc")) for name in ("store", "other"))
+    other.replace(kept)
+    stored_runs(config(), gains, tmp_path / "store")
+    assert train.n_runs == 3
+
+
 def test_growing_the_baseline_computes_only_the_new(train, tmp_path):
     ten = made(config(mcm={"n_samples": 10}), "mcm", tmp_path)
     assert train.n_runs == 10

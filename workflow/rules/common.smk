@@ -120,12 +120,10 @@ def options_of(stage):
     return written
 
 
-def outputs_of(stage) -> list[str]:
-    """The file of a stage, and its table as text if it has one."""
+def tables_of(stage) -> list[str]:
+    """The table of a stage as text beside its file, if it has one."""
     stem = f"<results>/{FILES[stage.name].removesuffix('.nc')}"
-    return [
-        f"{stem}{end}" for end in (".nc", *((".csv", ".md") if stage.table else ()))
-    ]
+    return [f"{stem}{end}" for end in (".csv", ".md")] if stage.table else []
 
 
 def message_of(stage) -> str:

@@ -43,7 +43,8 @@ for stage in STAGES.values():
         input:
             unpack(inputs_of(stage)),
         output:
-            outputs_of(stage),
+            file=f"<results>/{FILES[stage.name]}",
+            table=tables_of(stage),
         log:
             f"<logs>/{FILES[stage.name].removesuffix('.nc')}.log",
         benchmark:
@@ -58,14 +59,14 @@ for stage in STAGES.values():
             "../envs/maglev.yaml"
         threads: THREADS.get(stage.name, 1)
         params:
-            code=code_of(f"stages.{stage.name}"),
+            code=stage.code,
             command=stage.command,
             options=options_of(stage),
         message:
             message_of(stage)
         shell:
             "NUMBA_NUM_THREADS={threads} MAGLEV_THREADS={threads} maglev {params.command} "
-            "{params.options} --out {output[0]} 2> {log}"
+            "{params.options} --out {output.file} 2> {log}"
 
 
 rule purge:

@@ -47,7 +47,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     axis.set(xscale="log", xlabel="frequency [Hz]", ylabel="damping [% of critical]")
     axis.set_ylim(min(0.0, 1.1 * ratio.min()), None)
     axis.set_title(f"(a) {frequency.size} modes of one car", loc="left")
-    style.below(fig, *axis.get_legend_handles_labels(), ncols=5)
+    style.below(fig, *axis.get_legend_handles_labels(), 5)
 
     rows = [("", "what moves", "frequency", "damping", "share")]
     colours = [style.MODEL] * named.size

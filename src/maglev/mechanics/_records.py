@@ -196,7 +196,7 @@ class Places(NamedTuple):
     first: np.ndarray  # (place,) first of the rail coefficients under the face
     start: np.ndarray  # (place + 1,) of their weights; none off the guideway
     weight: np.ndarray  # of the coefficients in the rail's mean motion under the face
-    rise: np.ndarray  # of the coefficients in the rate of that mean as the pole moves on [1/s]
+    rise: np.ndarray  # of the coefficients in the mean rate over a step as the pole moves on [1/s]
     rail: np.ndarray  # (place, side, 1 or LANES) irregularity of all samples, or of each [m]
     ramp: np.ndarray  # (place, side, 1 or LANES) its rate at the pole [m/s]
 

@@ -193,8 +193,10 @@ def places(
     number = (whole - earliest).astype(np.int64) + count * np.searchsorted(series, beyond)
     x = ((earliest + np.arange(count) + series[:, None]) * advance).ravel()
     magnet = _magnet(config, rows)
-    faces = face_weights(config.guideway, x, magnet.pole_length, lateral=rows.is_guidance)
-    sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x)
+    faces = face_weights(
+        config.guideway, x, magnet.pole_length, lateral=rows.is_guidance, advance=advance
+    )
+    sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x, advance)
     apart = np.array([1.0, -1.0 if rows.is_guidance else 1.0])
     nothing = np.zeros((x.size, 2, 1))
     tabulated = Places(
@@ -240,8 +242,12 @@ def _standing_sag(
     guideway: guideway_model.GuidewayModel,
     reduced: ReducedGuideway,
     x: Array,
+    advance: float,
 ) -> tuple[Array, Array]:
-    """Sag of the rails under poles at ``x`` beyond that of the modes, and its slope along x."""
+    """Sag of the rails under poles at ``x`` beyond that of the modes, and its slope along x.
+
+    The slope under a face is its mean over a step, as that of `face_weights`.
+    """
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
     magnet = _magnet(config, rows)
     force = float(rows.constant.mean()) * (rows.current_reference / rows.gap_reference) ** 2
@@ -259,7 +265,12 @@ def _standing_sag(
         )
         at = x[inside] - span * length
         sag[inside] = np.interp(at, places, of_span)
-        slope[inside] = np.interp(at, places, its_slope)
+        if magnet.pole_length == 0:
+            slope[inside] = np.interp(at, places, its_slope)
+            continue
+        ends = [np.clip(at + part * advance, 0.0, length) for part in (-0.5, 0.5)]
+        rise = np.subtract(*(np.interp(end, places, of_span) for end in ends[::-1]))
+        slope[inside] = rise / (ends[1] - ends[0])
     return sag, slope
 
 

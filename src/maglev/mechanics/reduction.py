@@ -183,12 +183,13 @@ class FaceWeights:
 
 
 def face_weights(
-    guideway: Guideway, x: npt.ArrayLike, length: float, *, lateral: bool
+    guideway: Guideway, x: npt.ArrayLike, length: float, *, lateral: bool, advance: float = 0.0
 ) -> FaceWeights:
     """Mean motion of the rails under faces, the rails straight and rigid off the guideway.
 
     A face that passes a joint sees the step between two units as a ramp: the derivative of its mean
-    is the difference of the motions under its two edges over its length.
+    is the difference of the motions under its two edges over its length.  It jumps where an edge
+    meets the joint; its mean over ``advance`` does not, and adds up to the whole ramp.
 
     Parameters
     ----------
@@ -200,6 +201,9 @@ def face_weights(
         Of a face [m]; zero for points.
     lateral
         Whether the motion is ``rail_y``; else ``rail_z`` or ``rail_roll``.
+    advance
+        Way from half before a place to half behind it over which its slope is averaged [m]; zero
+        for the slope at the place.  Points have none but that.
 
     Returns
     -------
@@ -213,40 +217,69 @@ def face_weights(
     x = np.asarray(x, dtype=float)
     joints = _pieces(guideway)
     near, far = x - 0.5 * length, x + 0.5 * length
-    last = joints.size - 2
-    on = (far > 1e-9) & (near < joints[-1] - 1e-9)
-    rear = np.clip(np.searchsorted(joints, near + 1e-9, side="right") - 1, 0, last)
-    front = np.clip(np.searchsorted(joints, far - 1e-9, side="left") - 1, 0, last)
-    front = np.maximum(front, rear)
+    reach = 0.5 * advance if length > 0 else 0.0
+    on = (far + reach > 1e-9) & (near - reach < joints[-1] - 1e-9)
+    rear, front = _met(joints, near - reach, far + reach)
     first = _coefficient_of(guideway, rear)
     count = np.where(on, _coefficient_of(guideway, front) + 4 - first, 0)
     start = np.concatenate([[0], np.cumsum(count)])
     weight, slope = np.zeros((2, start[-1]))
+    here = start[:-1] - first  # where a place has the weight of the first coefficient of all
     if length == 0:
         _, values, slopes = _piece_weights(guideway, rear[on], x[on], lateral=lateral)
         at = start[:-1][on, None] + np.arange(4)
         weight[at], slope[at] = values, slopes
-        return FaceWeights(first, start, weight, slope)
+    else:
+        _add_means(guideway, near, far, 1.0, here, weight, lateral=lateral)
+        for edge, sign in ((near, -1.0), (far, 1.0)):
+            if advance > 0:
+                ends = (edge - reach, edge + reach)
+                _add_means(guideway, *ends, sign / length, here, slope, lateral=lateral)
+                continue
+            met = np.flatnonzero(on & (edge >= -1e-9) & (edge <= joints[-1] + 1e-9))
+            piece = (rear if sign < 0 else front)[met]
+            coefficient, values, _ = _piece_weights(guideway, piece, edge[met], lateral=lateral)
+            at = (here[met] + coefficient)[:, None] + np.arange(4)
+            np.add.at(slope, at, values * (sign / length))
+    return FaceWeights(first, start, weight, slope)
+
+
+def _met(
+    joints: Array, low: Array, high: Array
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """First and last piece of rail of stretches; the nearest one for those off the guideway."""
+    last = joints.size - 2
+    rear = np.clip(np.searchsorted(joints, low + 1e-9, side="right") - 1, 0, last)
+    front = np.clip(np.searchsorted(joints, high - 1e-9, side="left") - 1, 0, last)
+    return rear, np.maximum(front, rear)
+
+
+def _add_means(
+    guideway: Guideway,
+    low: Array,
+    high: Array,
+    factor: float,
+    here: npt.NDArray[np.int64],
+    target: Array,
+    *,
+    lateral: bool,
+) -> None:
+    """Add ``factor`` times the mean motion of the rails over stretches to their coefficients."""
+    joints = _pieces(guideway)
+    rear, front = _met(joints, low, high)
+    on = (high > 1e-9) & (low < joints[-1] - 1e-9)
     gauss, share = np.polynomial.legendre.leggauss(2)  # exact for the cubic shapes of a piece
     for step in range(int((front - rear)[on].max(initial=-1)) + 1):
         which = np.flatnonzero(on & (rear + step <= front))
         piece = rear[which] + step
-        low = np.maximum(near[which], joints[piece])
-        high = np.minimum(far[which], joints[piece + 1])
-        at = (start[which] + _coefficient_of(guideway, piece) - first[which])[:, None]
-        at = at + np.arange(4)
+        begin = np.maximum(low[which], joints[piece])
+        end = np.minimum(high[which], joints[piece + 1])
+        at = (here[which] + _coefficient_of(guideway, piece))[:, None] + np.arange(4)
+        covered = factor * (end - begin) / (high - low)[which]
         for node, part in zip(gauss, share, strict=True):
-            inside = 0.5 * (low + high) + 0.5 * (high - low) * node
+            inside = 0.5 * (begin + end) + 0.5 * (end - begin) * node
             _, values, _ = _piece_weights(guideway, piece, inside, lateral=lateral)
-            np.add.at(weight, at, values * (0.5 * part * (high - low) / length)[:, None])
-    for edge, piece, sign in ((near, rear, -1.0), (far, front, 1.0)):
-        which = np.flatnonzero(on & (edge >= -1e-9) & (edge <= joints[-1] + 1e-9))
-        coefficient, values, _ = _piece_weights(
-            guideway, piece[which], edge[which], lateral=lateral
-        )
-        at = (start[which] + coefficient - first[which])[:, None] + np.arange(4)
-        np.add.at(slope, at, values * (sign / length))
-    return FaceWeights(first, start, weight, slope)
+            np.add.at(target, at, values * (0.5 * part * covered)[:, None])
 
 
 def _pieces(guideway: Guideway) -> Array:

@@ -141,7 +141,7 @@ class _Design:
             else partial(fit_selected, choice=self.settings.surrogate)
         )
         self.content = self._content()
-        self.code = code_of("stages.design")
+        self.code = code_of("stages.design", without=["stage"])
         key = key_of(self.content, self.code)
         self.folder = self.store / "rounds" / case / method / key
 

@@ -1,0 +1,417 @@
+"""What magnets see and do in the reference solver: faces over rails and track, and circuits.
+
+Theory: docs/theory/control.md and docs/theory/integration.md, "Reference solver".
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from scipy.interpolate import CubicHermiteSpline, PPoly
+
+from maglev.mechanics import guideway as guideway_model
+from maglev.mechanics import timoshenko
+from maglev.mechanics import train as train_model
+from maglev.mechanics.control import circuits as grouping_of
+from maglev.mechanics.irregularity import Profile
+from maglev.parameters import Config
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+_GAUSS = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3)  # exact for cubics, the shapes of a beam
+
+
+@dataclass(frozen=True)
+class Poles:
+    """All poles of the train, magnet by magnet and from the front.
+
+    Attributes
+    ----------
+    magnet : (pole,)
+        Number in the train's table of magnets.
+    x, face : (pole,)
+        Place of the centre relative to the train's nose, and length of the face [m].
+    is_guidance, side : (pole,)
+        Kind, and +1 right or -1 left.
+    opening : (pole,)
+        Change of the gap per displacement of the magnet, z or y [-].
+    opens : csr (pole, train dof)
+        Change of the gap per degree of freedom of the train [-, m].
+    static_force, constant : (pole, 1)
+        F₀ [N] and K = F₀ (δ₀ / i₀)² [N m²/A²].
+    gap, current, current_max : (pole, 1)
+        δ₀ [m], i₀ and largest current [A].
+    """
+
+    magnet: IntArray
+    x: Array
+    face: Array
+    is_guidance: npt.NDArray[np.bool_]
+    side: IntArray
+    opening: Array
+    opens: sp.csr_array
+    static_force: Array
+    constant: Array
+    gap: Array
+    current: Array
+    current_max: Array
+
+
+def poles_of(train: train_model.TrainModel) -> Poles:
+    """Every pole of a train and how its gap follows the train's motion."""
+    magnets, parameters = train.magnets, train.parameters
+    static = train_model.pole_static_force(parameters, magnets)
+    kinds = (parameters.suspension_magnet, parameters.guidance_magnet)
+    kind = [kinds[int(guides)] for guides in magnets.is_guidance]
+    magnet = np.repeat(np.arange(magnets.x.size), [k.n_poles for k in kind])
+    ahead = np.concatenate([train_model.pole_offsets(k) for k in kind])
+    is_guidance, side = magnets.is_guidance[magnet], magnets.side[magnet]
+    opening = np.where(is_guidance, side, 1.0)
+    arm = np.where(is_guidance, ahead, -ahead)  # u_y = y + psi dx, u_z = z - theta dx
+    number = np.arange(magnet.size)
+    dof = np.concatenate([magnets.translation_dof[magnet], magnets.rotation_dof[magnet]])
+    opens = sp.csr_array(
+        (np.concatenate([opening, opening * arm]), (np.concatenate([number, number]), dof)),
+        shape=(number.size, train.mass.size),
+    )
+
+    def of_kind(name: str) -> Array:
+        return np.where(is_guidance, getattr(kinds[1], name), getattr(kinds[0], name))[:, None]
+
+    static_force = np.concatenate([static[m, : k.n_poles] for m, k in enumerate(kind)])[:, None]
+    gap, current = of_kind("gap_reference"), of_kind("current_reference")
+    return Poles(
+        magnet=magnet,
+        x=magnets.x[magnet] + ahead,
+        face=of_kind("pole_length")[:, 0],
+        is_guidance=is_guidance,
+        side=side,
+        opening=opening,
+        opens=opens,
+        static_force=static_force,
+        constant=static_force * (gap / current) ** 2,
+        gap=gap,
+        current=current,
+        current_max=of_kind("current_max"),
+    )
+
+
+class Rails:
+    """The rails as beam elements: mean of their deflection over a face, and its rate of travel.
+
+    Deflections are written in the elements' own ends: four numbers an element, deflection and turn
+    of the section at either end, for both planes of both rails (`ends` reads them off the
+    guideway's motion).  Faces are split at the ends of elements, so that joints of units count.
+    """
+
+    def __init__(self, model: guideway_model.GuidewayModel, poles: Poles) -> None:
+        lines = [
+            (line, plane) for line in model.rail_lines for plane in (line.vertical, line.lateral)
+        ]
+        self.start, self.length = lines[0][0].start, lines[0][0].length
+        self.end = model.parameters.length
+        self.line = np.where(poles.side > 0, 0, 2) + poles.is_guidance  # as in `lines`
+        self.phi = np.stack([plane.phi for _, plane in lines])
+        self.face = poles.face
+        terms = [plane.dof.shape[2] for _, plane in lines]
+        n_rows = sum(4 * plane.phi.size for _, plane in lines)
+        row = np.repeat(np.arange(n_rows), np.repeat(terms, [4 * p.phi.size for _, p in lines]))
+        share = np.concatenate([plane.share.ravel() for _, plane in lines])
+        dof = np.concatenate([plane.dof.ravel() for _, plane in lines])
+        self.ends = sp.csr_array((share, (row, dof)), shape=(n_rows, model.n_dof))
+        self.ends_transposed = self.ends.T.tocsr()
+
+    def under(self, x: Array, speed: float, step: float) -> tuple[sp.csr_array, sp.csr_array]:
+        """Rows of what the faces of poles see of the rails.
+
+        What jumps where a joint passes counts with its mean over one step, so that its impulse does
+        not hang on where in a step the joint is met: the difference of a face's edges, and all that
+        a point sees.  For what does not jump that is an error of second order, like the step's.
+
+        Parameters
+        ----------
+        x : (time, pole)
+            Places of the poles' centres [m].
+        speed, step
+            Of the train [m/s], and Δt [s].
+
+        Returns
+        -------
+        mean : csr (time pole, end)
+            Mean deflection over each face, as share of the elements' ends [-, m].
+        travel : csr (time pole, end)
+            What its rate has because the pole travels [1/s, m/s].
+        """
+        deflection, slope = timoshenko.deflection_shape, timoshenko.slope_shape
+        face, advance = np.tile(self.face, x.shape[0]), speed * step
+        x = x.ravel()
+        front, rear, point = x + 0.5 * face, x - 0.5 * face, face == 0
+        mean = self._mean(deflection, x, np.where(point, advance, face))
+        rate = speed / np.where(point, np.inf, face)
+        travel = self._mean(deflection, front, advance, rate)
+        travel = travel - self._mean(deflection, rear, advance, rate)
+        if point.any():
+            travel = travel + self._mean(slope, x, advance, np.where(point, speed, 0.0))
+        return mean, travel
+
+    def _mean(
+        self,
+        shape: Callable[..., Array],
+        x: Array,
+        width: npt.ArrayLike,
+        times: npt.ArrayLike = 1.0,
+    ) -> sp.csr_array:
+        """Rows (pole, end) of a mean over ``width`` around ``x`` [m], nothing off the guideway."""
+        width = np.broadcast_to(width, x.shape)
+        low, high = (np.clip(x + side * width, 0.0, self.end) for side in (-0.5, 0.5))
+        first = np.clip(np.searchsorted(self.start, low, side="right") - 1, 0, None)
+        n_pieces = int((np.searchsorted(self.start, high) - first).max(initial=1))
+        element = first[:, None] + np.arange(n_pieces)
+        inside = element < self.start.size
+        element = np.minimum(element, self.start.size - 1)
+        origin, L = self.start[element], self.length[element]
+        begin = np.clip(origin, low[:, None], high[:, None]) - origin
+        piece = np.clip(origin + L, low[:, None], high[:, None]) - origin - begin
+        weight = np.where(inside, piece / width[:, None], 0.0)
+        weight *= np.broadcast_to(times, x.shape)[:, None]
+        line = np.tile(self.line, x.size // self.line.size)[:, None]
+        phi = self.phi[line, element]
+        share = sum(0.5 * shape(L, phi, begin + at * piece) for at in _GAUSS) * weight[..., None]
+        end = 4 * (line * self.start.size + element)[..., None] + np.arange(4)
+        pointer = share[0].size * np.arange(x.size + 1)
+        return sp.csr_array(
+            (share.ravel(), end.ravel(), pointer), shape=(x.size, self.ends.shape[0])
+        )
+
+
+class Track:
+    """Irregularity as the faces of the poles see it."""
+
+    def __init__(self, profile: Profile, poles: Poles) -> None:
+        grid = profile.x0 + profile.dx * np.arange(profile.values.shape[1])
+        self.profiles: list[PPoly] = [
+            CubicHermiteSpline(grid, value, slope)
+            for value, slope in zip(profile.values, profile.slopes, strict=True)
+        ]
+        self.sums = [one.antiderivative() for one in self.profiles]
+        self.profile = np.where(poles.is_guidance, 2, 0) + np.where(poles.side > 0, 0, 1)
+        self.face = poles.face
+
+    def under(self, x: Array, speed: float) -> tuple[Array, Array]:
+        """Mean irregularity [m] over each face centred at ``x`` [m] and its rate [m/s].
+
+        All are (time, pole).
+        """
+        mean, rate = np.empty(x.shape), np.empty(x.shape)
+        for number, (profile, total) in enumerate(zip(self.profiles, self.sums, strict=True)):
+            at = (self.profile == number) & (self.face == 0)
+            mean[:, at], rate[:, at] = profile(x[:, at]), speed * profile(x[:, at], 1)
+            at = (self.profile == number) & (self.face > 0)
+            place, face = x[:, at], self.face[at]
+            front, rear = place + 0.5 * face, place - 0.5 * face
+            mean[:, at] = (total(front) - total(rear)) / face
+            rate[:, at] = speed * (profile(front) - profile(rear)) / face
+        return mean, rate
+
+
+# --- what the circuits do -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Circuits:
+    """All circuits of the train for one step length: from gaps to currents.
+
+    Attributes
+    ----------
+    feed : csr (circuit, pole)
+        Weight of each pole's gap in a circuit's signal [-].
+    drive : csr (pole, circuit)
+        Weight of each circuit's current in a pole's [-].
+    force_gap : csr (pole, pole)
+        Weight of each pole's gap in the gap that a pole's force goes by [-].
+    proportional, derivative, acceleration, integral : (circuit, sample)
+        k_p [A/m], k_d [A s/m], k_a [A s²/m], k_i [A/(m s)].
+    decay, newest : (circuit, 1)
+        A current after a step: ``decay`` times the last, ``newest`` times the newest command, the
+        rest times the command before [-].
+    taps
+        Delay: how many steps back, and with which weight (circuit, 1), a signal counts [-].
+    current, current_max : (circuit, 1)
+        i₀ and largest command [A].
+    step
+        Δt [s].
+    """
+
+    feed: sp.csr_array
+    drive: sp.csr_array
+    force_gap: sp.csr_array
+    proportional: Array
+    derivative: Array
+    acceleration: Array
+    integral: Array
+    decay: Array
+    newest: Array
+    taps: tuple[tuple[int, Array], ...]
+    current: Array
+    current_max: Array
+    step: float
+
+    def delayed(self, signals: deque[Array]) -> Array:
+        """The part of the delayed signal (circuit, sample) [A] that earlier steps decide."""
+        total = np.zeros_like(self.proportional)
+        for back, weight in self.taps:
+            if 0 < back <= len(signals):
+                total += weight * signals[-back]
+        return total
+
+    @property
+    def at_once(self) -> Array:
+        """Weight (circuit, 1) of a signal of this step in the delayed signal of this step [-]."""
+        return sum((weight for back, weight in self.taps if back == 0), np.zeros_like(self.current))
+
+
+@dataclass
+class Charge:
+    """Where the circuits are: each (circuit, sample), at the end of a step.
+
+    Attributes
+    ----------
+    error, integral
+        Gap less its reference [m], and its integral over time [m s].
+    command, current
+        [A].
+    signals
+        u of the last steps, the latest last [A].
+    """
+
+    error: Array
+    integral: Array
+    command: Array
+    current: Array
+    signals: deque[Array]
+
+
+def delay_taps(delay: float, step: float) -> dict[int, float]:
+    """Weights of stored signals that give the signal a delay ago: a cubic through four of them.
+
+    Parameters
+    ----------
+    delay, step
+        Delay and Δt [s].
+
+    Returns
+    -------
+    taps
+        Weight [-] by how many steps back; 0 is the signal of this step.
+    """
+    back = delay / step
+    nodes = max(math.floor(back) - 1, 0) + np.arange(4)
+    weights = {}
+    for k, node in enumerate(nodes):
+        others = np.delete(nodes, k)
+        weight = float(np.prod((back - others) / (node - others)))
+        if weight != 0.0:
+            weights[int(node)] = weight
+    return weights
+
+
+def lag_weights(lag: float, step: float) -> tuple[float, float]:
+    """`Circuits.decay` and `Circuits.newest`: exact for a command that is linear within the step.
+
+    Parameters
+    ----------
+    lag, step
+        Time constant and Δt [s].
+    """
+    if lag == 0:
+        return 0.0, 1.0
+    decay = math.exp(-step / lag)
+    return decay, 1.0 + math.expm1(-step / lag) * lag / step
+
+
+def circuits_of(config: Config, poles: Poles, gains: Array, step: float) -> Circuits:
+    """Circuits of every magnet of the train, in the order of its magnets."""
+    magnets = (config.train.suspension_magnet, config.train.guidance_magnet)
+    controls = (config.control.suspension, config.control.guidance)
+    groups = [grouping_of(c, m.n_poles) for c, m in zip(controls, magnets, strict=True)]
+    first = np.flatnonzero(np.diff(poles.magnet, prepend=-1))
+    kinds = poles.is_guidance[first].astype(int)
+    same = [np.eye(m.n_poles) for m in magnets]
+    mean = [np.full((m.n_poles, m.n_poles), 1 / m.n_poles) for m in magnets]
+    by = [mean[k] if groups[k].mean_gap_force else same[k] for k in (0, 1)]
+    kind = np.concatenate([np.full(groups[k].feed.shape[0], k) for k in kinds])
+
+    def blocks(each: list[Array]) -> sp.csr_array:
+        return sp.csr_array(sp.block_diag([each[k] for k in kinds], format="csr"))
+
+    def column(suspension: float, guidance: float) -> Array:
+        return np.where(kind == 0, suspension, guidance)[:, None]
+
+    lags = [lag_weights(control.lag, step) for control in controls]
+    taps = [delay_taps(control.delay, step) for control in controls]
+    of_kind = {"p": gains[:, [0, 2]], "d": gains[:, [1, 3]], "a": gains[:, [4, 6]]}
+    of_kind["i"] = gains[:, [5, 7]]
+    return Circuits(
+        feed=blocks([group.feed for group in groups]),
+        drive=blocks([group.drive for group in groups]),
+        force_gap=blocks(by),
+        proportional=of_kind["p"].T[kind],
+        derivative=of_kind["d"].T[kind],
+        acceleration=of_kind["a"].T[kind],
+        integral=of_kind["i"].T[kind],
+        decay=column(lags[0][0], lags[1][0]),
+        newest=column(lags[0][1], lags[1][1]),
+        taps=tuple(
+            (back, column(taps[0].get(back, 0.0), taps[1].get(back, 0.0)))
+            for back in sorted(set(taps[0]) | set(taps[1]))
+        ),
+        current=column(*[magnet.current_reference for magnet in magnets]),
+        current_max=column(*[magnet.current_max for magnet in magnets]),
+        step=step,
+    )
+
+
+def resting(circuits: Circuits) -> Charge:
+    """The circuits before the run: no signal, the currents at their reference."""
+    zero = np.zeros_like(circuits.proportional)
+    depth = max(back for back, _ in circuits.taps) + 1
+    rest = circuits.current + zero
+    return Charge(zero, zero.copy(), rest, rest.copy(), deque(maxlen=depth))
+
+
+def charged(
+    circuits: Circuits, before: Charge, known: Array, error: Array, rate: Array, push: Array
+) -> tuple[Charge, Array]:
+    """The law of control over one step, docs/theory/control.md.
+
+    Parameters
+    ----------
+    circuits, before
+        The circuits, and where they were a step ago.
+    known : (circuit, sample)
+        From `Circuits.delayed` [A].
+    error, rate, push : (circuit, sample)
+        Signals now: gap error [m], its rate [m/s], acceleration that opens the gap [m/s²].
+
+    Returns
+    -------
+    now
+        Where the circuits are; its signals are those of ``before``.
+    signal : (circuit, sample)
+        u, to be stored once the step is found [A].
+    """
+    integral = before.integral + 0.5 * circuits.step * (before.error + error)
+    signal = circuits.proportional * error + circuits.derivative * rate
+    signal += circuits.acceleration * push + circuits.integral * integral
+    delayed = known + circuits.at_once * signal
+    command = np.clip(circuits.current + delayed, 0.0, circuits.current_max)
+    current = circuits.decay * before.current + circuits.newest * command
+    current += (1.0 - circuits.decay - circuits.newest) * before.command
+    return Charge(error, integral, command, current, before.signals), signal
