@@ -51,14 +51,18 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         axis.set_xticks(np.arange(levels.size), [f"{level:g}" for level in levels])
         axis.set_xlim(-0.6, levels.size - 0.4)
         axis.set(xlabel="failure probability [-]", ylabel=f"limit, {shown.axis}")
-    handles = [Line2D([], [], **look) for look in (_TRACK, _SEED, _LINE)]  # type: ignore[arg-type]
     words = [
         f"each of {n} tracks, in order of the limit",
         f"track of seed {seed}",
-        "the line, where so many tracks carry it",
+        "the line, gains and track random",
     ]
+    carried = bool((data["held_limit_of_line_status"] == _GIVEN).any())
+    looks = (_TRACK, _SEED, _LINE) if carried else (_TRACK, _SEED)
+    handles = [Line2D([], [], **look) for look in looks]  # type: ignore[arg-type]
     title = f"limits given that levitation holds; intervals: {labels.confidence(data)}"
-    style.below(fig, handles, words, columns=3, title=title)
+    if not carried:
+        title += f"; {n} tracks carry none of the line"
+    style.below(fig, handles, words[: len(handles)], columns=3, title=title)
     kept = ["seed_of_track", *(str(name) for name in data.data_vars if "held_limit" in str(name))]
     return fig, data[kept]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -50,7 +49,6 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         axis.set_ylim(0, 1.5 * line.max())
         axis.locator_params(axis="x", nbins=5)
         axis.set(xlabel=shown.axis, ylabel=shown.density_axis)
-    spread = (data["deviation_on_track"] / data["mean_on_track"]).to_numpy()
     handles = [Line2D([], [], **look) for look in (_LINE, _TRACK, _SEED)]  # type: ignore[arg-type]
     words = [
         f"the line: gains and track random, {n} tracks",
@@ -59,13 +57,11 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     ]
     title = (
         f"{int(data['n_runs'])} runs; in the panels: shares of the variance with "
-        f"{labels.confidence(data)} intervals; deviation over mean due to the gains on a track: "
-        f"{labels.percent(float(np.nanmin(spread)))} to {labels.percent(float(np.nanmax(spread)))}"
+        f"{labels.confidence(data)} intervals, with all points of the gains held"
     )
     style.below(fig, handles, words, columns=3, title=title)
     kept = [
-        "value", "density_of_track", "density_of_line", "seed_of_track", "deviation_on_track",
-        "mean_on_track", "n_runs",
+        "value", "density_of_track", "density_of_line", "seed_of_track", "n_runs",
         *(f"{name}_share{end}" for name in ("gains", "track", "interaction")
           for end in ("", "_low", "_high")),
     ]  # fmt: skip
