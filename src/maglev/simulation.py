@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Literal
 
@@ -63,9 +63,9 @@ def simulate(
         [m, m s-2] and their times [s], gaps [m], currents [A], ``status`` and where and when
         levitation was lost; with ``histories`` also the time series on ``t``.  The extremes of a
         lost sample are NaN, as are those of a sample whose gains ask for a smaller step, which is
-        not judged (status ``step_too_large``).  Attributes ``time_step`` [s] and ``n_steps``; of
-        the reference solver also ``estimated_error``, the largest of any extreme as a share of it,
-        and ``seconds``.
+        not judged (status ``step_too_large``).  Attributes ``time_step`` [s], ``n_steps`` and
+        ``track``, the words for the track that the numbers are of; of the reference solver also
+        ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
 
     Raises
     ------
@@ -105,6 +105,7 @@ def simulate(
             config, track(config), gains, record_interval=HISTORY_INTERVAL if histories else None
         )
     found = _dataset(config, gains, passages, histories)
+    found.attrs["track"] = track_words(config, seeds)
     if solver == "reference":
         found.attrs |= effort.attributes
     return datasets.describe(found)
@@ -131,6 +132,25 @@ def track(config: Config, seed: int | None = None) -> Profile:
     measured = profiles.read(name) if name else None
     chosen = config.seed if seed is None else seed
     return profile(irregularity, track_range(config), chosen, measured)
+
+
+def track_words(config: Config, seeds: Sequence[int] | None = None) -> str:
+    """Of which track numbers are, in words.
+
+    Parameters
+    ----------
+    config
+        Parameters of everything.
+    seeds
+        Of the tracks of samples that have each their own.
+    """
+    if not config.irregularity.enabled:
+        return "smooth track"
+    if config.irregularity.profile_file is not None:
+        return "measured track"
+    if seeds is not None:
+        return "a track of its own for every passage"
+    return f"track of seed {config.seed}"
 
 
 def _checked_seeds(track_seeds: npt.ArrayLike, n_samples: int, solver: str) -> list[int]:

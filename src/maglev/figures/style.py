@@ -118,6 +118,11 @@ def below(
     figure.legend(handles, words, loc=where, ncols=columns, title=title or None, title_fontsize=7)
 
 
+def say_track(figure: Figure, words: str) -> None:
+    """Write over a figure of which track its numbers are."""
+    figure.suptitle(words, x=0.995, ha="right", fontsize=6.5, color="#555555")
+
+
 def mark_demonstration(figure: Figure) -> None:
     """Write 'demonstration' across a figure that shows no result."""
     figure.text(
