@@ -2,8 +2,8 @@
 
 Run as ``python tests/reference/make_passages.py [name]``: without arguments all passages, with the
 name of one, such as ``430_smooth``, that one.  `430_irregular` is the default train and guideway at
-full size with two sets of gains, the others are of two cars over three spans with four.  The gains are
-drawn as the study draws them, and the passages are right to the tolerance that each file states.
+full size with two sets of gains, the others are of two cars over three spans with four.  The gains
+are drawn as the study draws them; the passages are right to the tolerance that each file states.
 """
 
 from __future__ import annotations
