@@ -32,20 +32,23 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from maglev import datasets, load_config, simulate
 from maglev.figures import style
 from maglev.fingerprint import code_of
-from maglev.mechanics import integrate, reference
+from maglev.mechanics import integrate, packing, reference
 from maglev.mechanics._kernels import (
-    _advance_line,
+    _advance_guideway,
     _advance_train,
-    _line_acceleration,
+    _answer,
     _links,
-    _load_line,
-    _magnets,
-    _move_rails,
-    zeros,
+    _load_span,
+    _move_span,
+    _new_watch,
+    at_rest,
 )
-from maglev.mechanics.course import first_step, n_steps, nose, start, time_step
+from maglev.mechanics._magnets import attract, circuits_at_rest, empty_magnet
+from maglev.mechanics._records import Motion, Rails
+from maglev.mechanics._rows import zeros
+from maglev.mechanics.course import course
 from maglev.mechanics.lanes import LANES
-from maglev.parameters import Config
+from maglev.parameters import Circuit, Config
 from maglev.simulation import _system, track
 from maglev.stages.passage import STAGE
 
@@ -57,6 +60,7 @@ Array = npt.NDArray[np.float64]
 
 TARGET_RATIO, TARGET_STARTUP, TARGET_MINUTES, TARGET_THREADS = 200, 3.0, 10.0, 1.9
 TARGET_SPANS, TARGET_MEMORY = 4.0, 4.0
+TARGET_FACES, TARGET_ENDS, TARGET_LATE = 1.10, 1.00, 1.15
 N_PASSAGES = 10_000
 
 BUSY = 0.5
@@ -94,6 +98,8 @@ class Sizes:
         Sizes of the three series; samples run on the default configuration.
     reference_seconds
         Processor time that the reference solver gets [s], half as much more before the guideway.
+    law_repeats
+        Rounds in which every law of control is timed, one after the other.
     thread_samples
         Samples of the run on two threads against one.
     matrix, copied
@@ -104,6 +110,7 @@ class Sizes:
     cars: tuple[int, ...] = (1, 2, 5, 10)
     samples: tuple[int, ...] = (1, 2, 16, 17, 64, 256, 1000)
     reference_seconds: float = 20.0
+    law_repeats: int = 9
     thread_samples: int = 64
     matrix: int = 2000
     copied: int = 2**25
@@ -114,6 +121,7 @@ QUICK = Sizes(
     cars=(2, 5),
     samples=(1, 2, 16, 17),
     reference_seconds=4.0,
+    law_repeats=3,
     thread_samples=32,
     matrix=1000,
     copied=2**23,
@@ -214,8 +222,8 @@ class Phase:
 
 def noses(system: integrate.System) -> Array:
     """Place of the nose at every step (step,) [m]."""
-    steps = np.arange(1, n_steps(system.config) + 1)
-    return nose(system.config, steps * time_step(system.config))
+    steps = np.arange(1, course(system.config).n_steps + 1)
+    return course(system.config).nose(steps * course(system.config).time_step)
 
 
 def rail_under_train(system: integrate.System) -> Array:
@@ -233,21 +241,23 @@ def rail_under_train(system: integrate.System) -> Array:
     return np.array(shares)
 
 
-def poles_on_guideway(system: integrate.System) -> tuple[int, float]:
-    """Poles of the train [-], and how many of them are over the guideway in a mean step [-]."""
+def poles_and_coefficients(system: integrate.System) -> tuple[int, float]:
+    """Poles of the train, and the rail coefficients under all their faces in a mean step [-]."""
     poles, met = 0, 0
     for places in (system.suspension_places, system.guidance_places):
-        on = np.concatenate([[0], np.cumsum(places.base >= 0)])
-        n = n_steps(system.config)
+        n = course(system.config).n_steps
         poles += 2 * places.number.size  # right and left
-        met += 2 * int((on[places.number + n + 1] - on[places.number + 1]).sum())
-    return poles, met / n_steps(system.config)
+        # places follow each other, and so do their coefficients
+        met += 2 * int(
+            (places.start[places.number + n + 1] - places.start[places.number + 1]).sum()
+        )
+    return poles, met / course(system.config).n_steps
 
 
 def steps_of_stages(system: integrate.System) -> Array:
     """Steps that each stage of the guideway lasts (stage,) [-]."""
     begins = system.line.stages.first_step
-    return np.diff([*begins, n_steps(system.config) + 1])
+    return np.diff([*begins, course(system.config).n_steps + 1])
 
 
 def operations(system: integrate.System) -> dict[str, float]:
@@ -258,14 +268,16 @@ def operations(system: integrate.System) -> dict[str, float]:
     # links: what they hang on 3, fused; stretch 2m - 1 and force back 2m for m coefficients
     links = 3 * vehicle.scaled_dof.size + 4 * vehicle.link_coefficient.size
     links -= vehicle.link_start.size - 1
-    moving = 1 - (first_step(system.config) - 1) / n_steps(system.config)  # the train rests before
+    moving = (
+        1 - (course(system.config).first_step - 1) / course(system.config).n_steps
+    )  # the train rests before
     # poles: gap error 3, its rate 3, gap 1, current 4, pull 3, force and moment 3, means 2;
     # a magnet: signs 4, force and moment on the train 6, means 2
-    n_poles, n_on = poles_on_guideway(system)
+    n_poles, n_under = poles_and_coefficients(system)
     n_magnets = system.train.magnets.x.size
     poles = 19 * n_poles + 12 * n_magnets
-    # rail under a pole: 4 coefficients in error, twice in its rate, and in the force back, fused
-    under_poles = 4 * (3 * 2 + 2) * n_on
+    # rail under a face: a coefficient in error, twice in its rate, and in the force back, fused
+    under_poles = (3 * 2 + 2) * n_under
     # rails of a span: displacement and velocity of z, roll and y from the coordinates that move
     # them, right and left from mean and roll; back: forces on those coordinates
     rails = 0.0
@@ -275,7 +287,7 @@ def operations(system: integrate.System) -> dict[str, float]:
     # guideway, of what is stepped: relative motion and its rate, forces back, stiffness, damping,
     # exact step, pier tops
     guideway, line_states, stages = 0.0, 0.0, line.stages
-    for stage, share in enumerate(steps / n_steps(system.config)):
+    for stage, share in enumerate(steps / course(system.config).n_steps):
         start, tops, stop = stages.start[stage], stages.tops[stage], stages.start[stage + 1]
         modes = stages.stepped[start:tops]
         carried = np.diff(line.carried_start)[modes].sum()
@@ -290,7 +302,7 @@ def operations(system: integrate.System) -> dict[str, float]:
     # states: x 2, velocity 2, predicted 4, fused; the train's forces over its masses 1
     states = 9 * n_dof * moving + line_states
     # outputs: midspan z and y 4 a column, each section of the low-pass 9, peak of a response 9
-    n_sections = integrate._run(system.config, 0).sections.shape[0]
+    n_sections = packing.run(system.config, 0).sections.shape[0]
     outputs = 2 * (4 * line.output_column.size + 9 * n_sections)
     outputs += 9 * (4 + 2 * vehicle.body_z.size)
     return {
@@ -305,46 +317,47 @@ def operations(system: integrate.System) -> dict[str, float]:
 
 
 @njit
-def _repeat_links(n, vehicle, x, velocity, scaled, pull, force):
+def _repeat_links(n, vehicle, train, scaled, pull):
     for _ in range(n):
-        _links(vehicle, x, velocity, scaled, pull, force)
+        _links(vehicle, train, scaled, pull)
 
 
 @njit
-def _repeat_train(n, vehicle, dt, x, velocity, before, predicted, force):
+def _repeat_train(n, vehicle, dt, train):
     for _ in range(n):
-        _advance_train(vehicle, dt, x, velocity, before, predicted, force)
+        _advance_train(vehicle, dt, train)
 
 
 @njit
-def _repeat_line(n, line, stage, x, velocity, force):
+def _repeat_answer(n, line, stage, guideway):
     for _ in range(n):
-        _line_acceleration(line, stage, x, velocity, force)
+        _answer(line, stage, guideway)
 
 
 @njit
-def _repeat_advance(n, line, stage, dt, x, velocity, before, acceleration, rate):
+def _repeat_advance(n, line, stage, dt, guideway):
     for _ in range(n):
-        _advance_line(line.stages, stage, dt, x, velocity, before, acceleration, rate)
+        _advance_guideway(line.stages, stage, dt, guideway)
 
 
 @njit
-def _repeat_rails(n, line, span, x, velocity, motion, rate, pull, turn, packed, force):
+def _repeat_rails(n, line, span, guideway, rails, turn, packed):
     """What the passage does with the rails of one span in a step, there and back."""
     for _ in range(n):
-        _move_rails(line, span, 0, line.stride, x, packed, motion)
-        _move_rails(line, span, 0, line.stride, velocity, packed, rate)
-        _load_line(line, span, 0, line.stride, pull, turn, force)
+        _move_span(line, span, 0, line.stride, guideway.position, packed, rails.motion)
+        _move_span(line, span, 0, line.stride, guideway.predicted, packed, rails.rate)
+        _load_span(line, span, 0, line.stride, rails, turn, guideway.force)
 
 
 @njit
 def _every_step(
-    stride, first, last, places, rows, gains, x, v, force, motion, rate, pull, outcome, magnet
-):
+    stride, first, last, places, rows, law, dt, gains, train, rails, magnet, circuits, watch,
+    outcome,
+):  # fmt: skip
     for step in range(first, last + 1, stride):
-        _magnets(
-            places, rows, step, gains, x, v, force, motion, rate, pull, False, outcome,
-            magnet[0], magnet[1], magnet[2], magnet[3],
+        attract(
+            places, rows, law, step, dt, gains, train, rails, magnet, circuits, False, watch,
+            outcome,
         )  # fmt: skip
 
 
@@ -356,7 +369,7 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     """
     counted = operations(system)
     line, rng = system.line, np.random.default_rng(3)
-    vehicle, dt = system.vehicle, time_step(system.config)
+    vehicle, dt = system.vehicle, course(system.config).time_step
     n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
     n_rail = line.n_spans * line.stride
 
@@ -366,63 +379,69 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
         filled[:] = size * rng.standard_normal((n, LANES))
         return filled
 
-    x, v, force = rows(n_dof, 1e-5), rows(n_dof, 1e-5), zeros(n_dof)
-    resting = [zeros(n_dof) for _ in range(5)]
+    def motion(n: int, size: float) -> Motion:
+        """Degrees of freedom that move; no forces."""
+        return Motion(*(rows(n, size) for _ in range(4)), zeros(n))
+
+    train, resting = motion(n_dof, 1e-5), at_rest(n_dof)
     scaled, link_pull = zeros(vehicle.scaled_dof.size), zeros(vehicle.link_start.size - 1)
-    line_x, line_v, line_force = rows(n_line, 1e-5), rows(n_line, 1e-5), zeros(n_line)
-    line_resting = [zeros(n_line) for _ in range(5)]
-    motion, rate, pull = (rows(3 * n_rail, 1e-5).reshape((3, n_rail, LANES)) for _ in range(3))
+    guideway, guideway_resting = motion(n_line, 1e-5), at_rest(n_line)
+    rails = Rails(*(rows(3 * n_rail, 1e-5).reshape((3, n_rail, LANES)) for _ in range(3)))
     turn, packed = zeros(line.stride), zeros(line.upright.size + line.sideways.size)
-    magnet = np.zeros((4, system.train.magnets.x.size, LANES))
-    run = integrate._run(system.config, 0)
-    outcome = integrate._empty_outcome(system, run)
-    gains = np.ascontiguousarray(gains_of(system.config, LANES).T)
+    run = packing.run(system.config, 0)
+    kinds = (system.suspension, system.guidance)
+    outcome = packing.empty_outcome(system.train, kinds, run)
+    n_responses = outcome.extreme.shape[0]
+    watch = _new_watch(system.train.magnets.x.size, run.sections.shape[0], n_responses)
+    gains = np.concatenate([gains_of(system.config, LANES), np.zeros((LANES, 4))], axis=1)
+    lanes = np.ascontiguousarray(gains.T)
 
     def per_call(n: int, function: Callable[[int], object]) -> float:
         function(1)  # compiles
         return timed(lambda: function(n), 3).process / n / LANES
 
     moving = 1 - (run.first_step - 1) / run.n_steps
-    links = moving * per_call(
-        2000, lambda n: _repeat_links(n, vehicle, x, v, scaled, link_pull, force)
-    )
-    states = moving * per_call(2000, lambda n: _repeat_train(n, vehicle, dt, *resting))
-    guideway = 0.0
+    links = moving * per_call(2000, lambda n: _repeat_links(n, vehicle, train, scaled, link_pull))
+    states = moving * per_call(2000, lambda n: _repeat_train(n, vehicle, dt, resting))
+    stepped = 0.0
     for stage, share in enumerate(steps_of_stages(system) / run.n_steps):
-        guideway += share * per_call(
-            500, lambda n, at=stage: _repeat_line(n, line, at, line_x, line_v, line_force)
-        )
+        stepped += share * per_call(500, lambda n, at=stage: _repeat_answer(n, line, at, guideway))
         states += share * per_call(
-            500, lambda n, at=stage: _repeat_advance(n, line, at, dt, *line_resting)
+            500, lambda n, at=stage: _repeat_advance(n, line, at, dt, guideway_resting)
         )
     shares = rail_under_train(system)
-    rails = sum(
+    of_rails = sum(
         share
         * per_call(
             1000,
-            lambda n, span=span: _repeat_rails(
-                n, line, span, line_x, line_v, motion, rate, pull, turn, packed, line_force
-            ),
+            lambda n, span=span: _repeat_rails(n, line, span, guideway, rails, turn, packed),
         )
         for span, share in enumerate(shares)
     )
     every = 20  # of all steps, evenly over the passage
     poles = 0.0
-    for rows, places in (
-        (system.suspension, system.suspension_places),
-        (system.guidance, system.guidance_places),
+    train, rails = motion(n_dof, 1e-5), Rails(*(0.0 * field for field in rails))
+    for kind, places, circuit in zip(
+        kinds,
+        (system.suspension_places, system.guidance_places),
+        (system.config.control.suspension, system.config.control.guidance),
+        strict=True,
     ):
+        law = packing.law(circuit, kind, dt, gains)
+        magnet, circuits = empty_magnet(kind, law), circuits_at_rest(kind, law)
 
-        def calls(n: int, rows=rows, places=places) -> None:
+        def calls(
+            n: int, kind=kind, places=places, law=law, magnet=magnet, circuits=circuits
+        ) -> None:
             last = run.n_steps if n > 1 else run.first_step
             _every_step(
-                every, run.first_step, last, places, rows, gains, x, v, force, motion, rate, pull,
-                outcome, magnet,
+                every, run.first_step, last, places, kind, law, dt, lanes, train, rails, magnet,
+                circuits, watch, outcome,
             )  # fmt: skip
 
         steps = run.n_steps + 1 - run.first_step
         poles += moving * per_call(-(-steps // every), calls)
-    rest = per_step - links - guideway - rails - poles - states
+    rest = per_step - links - stepped - of_rails - poles - states
     law, under, counted_states = (
         counted.pop(name)
         for name in (
@@ -436,11 +455,11 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
         Phase("poles: gap, current, force", law),
         Phase("poles: rail under them and force back", under),
         Phase("poles, both", law + under, poles),
-        Phase("rails: from modes and back", counted["rails: from modes and back"], rails),
+        Phase("rails: from modes and back", counted["rails: from modes and back"], of_rails),
         Phase(
             "guideway: stiffness, damping, pier tops",
             counted["guideway: stiffness, damping, pier tops"],
-            guideway,
+            stepped,
         ),
         Phase("states: predict and kick", counted_states, states),
         Phase("outputs and the rest", counted["outputs"], rest),
@@ -523,9 +542,79 @@ def reference_time(config: Config, seconds: float) -> Reference:
     """
     resting, _ = step_time(config, seconds / 2)
     running, steps = step_time(with_part(config, "passage", approach=1e-3), seconds)
-    before = int(-start(config) / config.passage.speed / time_step(config))
-    whole = resting * before + running * (n_steps(config) - before)
+    before = int(-course(config).start / config.passage.speed / course(config).time_step)
+    whole = resting * before + running * (course(config).n_steps - before)
     return Reference(resting, running, steps, whole)
+
+
+# ---------------------------------------------------------------- laws of control and faces
+
+LAG, DELAY = 2e-3, 1e-3
+"""Of the current and of the signal where they are timed [s]; what they are costs nothing."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A way of closing the magnets, and the process time of a passage with it [s]."""
+
+    name: str
+    cost: float
+
+
+def closed(config: Config, *, pole_length: float | None = None, **circuit: object) -> Config:
+    """A configuration whose magnets all have other circuits, or faces of another length [m]."""
+    both = Circuit.model_construct(**(Circuit().model_dump() | circuit))
+    kinds = ("suspension", "guidance")
+    config = config.model_copy(
+        update={"control": config.control.model_copy(update=dict.fromkeys(kinds, both))}
+    )
+    if pole_length is None:
+        return config
+    magnets = {
+        f"{kind}_magnet": getattr(config.train, f"{kind}_magnet").model_copy(
+            update={"pole_length": pole_length}
+        )
+        for kind in kinds
+    }
+    return config.model_copy(update={"train": config.train.model_copy(update=magnets)})
+
+
+def laws(config: Config, repeats: int) -> list[Law]:
+    """Passages with every grouping, late circuits and points, in turns; the least of each.
+
+    On a smooth track: grouped circuits may lose levitation on a rough one, and a row of lost
+    samples would end early.
+    """
+    config = with_part(config, "irregularity", enabled=False)
+    variants = {
+        "pole": closed(config),
+        "pole, poles as points": closed(config, pole_length=0.0),
+        **{group: closed(config, group=group) for group in ("ends", "half", "lumped")},
+        "pole, lag": closed(config, lag=LAG),
+        "pole, delay": closed(config, delay=DELAY),
+        "pole, lag and delay": closed(config, lag=LAG, delay=DELAY),
+    }
+    systems = {
+        name: integrate.prepare(variant, track(variant)) for name, variant in variants.items()
+    }
+    gains = gains_of(config, LANES)
+    for name, system in systems.items():
+        if integrate.integrate(system, gains).status.any():
+            raise RuntimeError(f"samples lost levitation with {name!r}")
+    best = dict.fromkeys(systems, np.inf)
+    for _ in range(repeats):
+        for name, system in systems.items():
+            once = timed(lambda system=system: integrate.integrate(system, gains))
+            best[name] = min(best[name], once.process / LANES)
+    for name, cost in best.items():
+        tell(f"  {name}: {cost:.4f} s a passage, {cost / best['pole']:.2f} of that of 'pole'")
+    return [Law(name, cost) for name, cost in best.items()]
+
+
+def over(laws: list[Law], name: str, base: str) -> float:
+    """Cost of a law over that of another [-]."""
+    cost = {law.name: law.cost for law in laws}
+    return cost[name] / cost[base]
 
 
 # ---------------------------------------------------------------- how the cost grows
@@ -568,7 +657,7 @@ def grown(configs: dict[int, Config]) -> list[Row]:
         prepared = time.process_time() - began
         gains = gains_of(config, LANES)
         run = timed(lambda system=system, gains=gains: integrate.integrate(system, gains))
-        rows.append(Row(size, run.process / LANES, n_steps(config), prepared))
+        rows.append(Row(size, run.process / LANES, course(config).n_steps, prepared))
         tell(f"  {size}: {rows[-1].cost:.3f} s a passage, prepared in {prepared:.2f} s")
     return rows
 
@@ -579,7 +668,7 @@ def batches(config: Config, counts: tuple[int, ...]) -> list[Row]:
     for count in counts:
         gains, begun = gains_of(config, count), time.process_time()
         passages = integrate.integrate(_system(config), gains)
-        rows.append(Row(count, time.process_time() - begun, n_steps(config)))
+        rows.append(Row(count, time.process_time() - begun, course(config).n_steps))
         if passages.status.any():
             raise RuntimeError(f"{np.count_nonzero(passages.status)} samples lost levitation")
         tell(f"  {count}: {rows[-1].cost:.2f} s, {rows[-1].cost / count:.3f} s a passage")
@@ -657,6 +746,7 @@ class Results:
     phases: list[Phase] = field(default_factory=list)
     bytes: tuple[int, int] = (0, 0)
     reference: Reference = Reference(0, 0, 0, 0)
+    laws: list[Law] = field(default_factory=list)
     cars: list[Row] = field(default_factory=list)
     spans: list[Row] = field(default_factory=list)
     wall: float = 0.0
@@ -685,6 +775,8 @@ def measure(sizes: Sizes) -> Results:
     integrate.integrate(system, gains_of(config, 1))
     results.production = timed(lambda: integrate.integrate(system, gains_of(config, LANES)), 3)
     tell(f"  {results.per_passage:.4f} s a passage")
+    tell("laws of control")
+    results.laws = laws(config, sizes.law_repeats)
     tell("samples")
     results.samples = batches(config, sizes.samples)
     results.memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
@@ -701,7 +793,7 @@ def measure(sizes: Sizes) -> Results:
     results.ceiling = ceiling(sizes)
     tell(f"  {results.ceiling.flops / 1e9:.1f} GFLOP/s, {results.ceiling.bytes / 1e9:.1f} GB/s")
     tell("phases")
-    results.phases = phases(system, results.per_passage / n_steps(config))
+    results.phases = phases(system, results.per_passage / course(config).n_steps)
     results.bytes = step_bytes(system)
     tell("reference solver")
     results.reference = reference_time(config, sizes.reference_seconds)
@@ -729,7 +821,7 @@ def table(head: list[str], rows: list[list[str]]) -> list[str]:
 
 def phase_rows(results: Results, config: Config) -> list[list[str]]:
     """Operations, time, rate and shares of every phase; whole step last."""
-    per_step = results.per_passage / n_steps(config)
+    per_step = results.per_passage / course(config).n_steps
     total = sum(p.operations for p in results.phases if p.seconds is not None)
     rows = []
     for phase in [*results.phases, Phase("**whole step**", total, per_step)]:
@@ -770,7 +862,7 @@ def page(results: Results, sizes: Sizes) -> str:
     longer = spans.get(20, most)
     many = [row for row in results.samples if row.size % LANES == 0 or row.size >= 10 * LANES]
     rate = results.phases and sum(p.operations for p in results.phases if p.seconds is not None)
-    rate = rate * n_steps(config) / results.per_passage
+    rate = rate * course(config).n_steps / results.per_passage
     base_wall = projected(results, results.per_passage, least.prepared)
     long_wall = projected(results, longer.cost, longer.prepared)
     n_most = results.samples[-1].size
@@ -784,10 +876,10 @@ def page(results: Results, sizes: Sizes) -> str:
         f"Python {platform.python_version()}, NumPy {np.__version__}.  The run took "
         f"{results.wall / 60:.1f} minutes.",
         f"Default configuration: {config.train.n_cars} cars, {config.guideway.n_spans} spans, "
-        f"{config.passage.speed * 3.6:.0f} km/h, {n_steps(config)} steps of "
-        f"{time_step(config) * 1e3:.3f} ms, modes to {config.passage.mode_cutoff:g} Hz at midspan "
-        f"and {config.passage.mode_cutoff_elsewhere:g} Hz elsewhere, rows of {LANES} samples.  "
-        "Seconds are process time on one core unless they are called wall.",
+        f"{config.passage.speed * 3.6:.0f} km/h, {course(config).n_steps} steps of "
+        f"{course(config).time_step * 1e3:.3f} ms, modes to {config.passage.mode_cutoff:g} Hz at "
+        f"midspan and {config.passage.mode_cutoff_elsewhere:g} Hz elsewhere, rows of {LANES} "
+        "samples.  Seconds are process time on one core unless they are called wall.",
         "",
         *(
             [
@@ -848,6 +940,19 @@ def page(results: Results, sizes: Sizes) -> str:
                     f"< {TARGET_STARTUP:g} s",
                     judged(beyond.process, TARGET_STARTUP, least=False),
                 ],
+                *(
+                    [
+                        f"{what} over {base}",
+                        f"{over(results.laws, name, base_name):.2f} times",
+                        f"≤ {target:.2f} times",
+                        judged(over(results.laws, name, base_name), target, least=False),
+                    ]
+                    for what, base, name, base_name, target in (
+                        ("faces", "points", "pole", "pole, poles as points", TARGET_FACES),
+                        ("`ends`", "`pole`", "ends", "pole", TARGET_ENDS),
+                        ("lag and delay", "neither", "pole, lag and delay", "pole", TARGET_LATE),
+                    )
+                ),
                 [
                     f"memory, {n_most} samples",
                     f"{results.memory / 1e9:.2f} GB",
@@ -879,11 +984,26 @@ def page(results: Results, sizes: Sizes) -> str:
         f"A row of samples goes through {results.bytes[0] / 2**10:.0f} KiB of states and "
         f"{results.bytes[1] / 2**10:.0f} KiB of matrices in a step.",
         "",
+        "## Laws of control",
+        "",
+        "Who shares a circuit, and how late its current comes; poles with their faces but where "
+        "they are points.  On smooth track, all in turns, the least of "
+        f"{sizes.law_repeats} rounds.",
+        "",
+        *table(
+            ["law", "s a passage", "over `pole`"],
+            [
+                [law.name, f"{law.cost:.4f}", f"{over(results.laws, law.name, 'pole'):.2f}"]
+                for law in results.laws
+            ],
+        ),
+        f"Lag {LAG * 1e3:g} ms, delay {DELAY * 1e3:g} ms.",
+        "",
         "## Reference solver",
         "",
         f"One sample, same configuration: {results.reference.resting * 1e3:.2f} ms a step before "
         f"the guideway and {results.reference.running * 1e3:.2f} ms over the first "
-        f"{results.reference.steps} steps on it, extrapolated to {n_steps(config)} steps: "
+        f"{results.reference.steps} steps on it, extrapolated to {course(config).n_steps} steps: "
         f"{results.reference.passage:.0f} s.  A step grows slower as more of the train is on the "
         "guideway, so a whole passage takes longer than this.",
         "",

@@ -17,7 +17,7 @@ from unittest import mock
 import numpy as np
 
 from maglev.mechanics import activity, integrate, reduction
-from maglev.mechanics.course import time_step
+from maglev.mechanics.course import course
 from maglev.parameters import Config
 from maglev.simulation import track
 from maglev.vocabulary import RESPONSES
@@ -120,7 +120,7 @@ def other_speeds(heads: list[str]) -> list[str]:
         "| --- | ---: |" + " ---: |" * len(heads),
     ]
     for speed in OTHER_SPEEDS_KMH:
-        step = time_step(configuration(DEFAULT, speed)) * 1e3
+        step = course(configuration(DEFAULT, speed)).time_step * 1e3
         exact = extremes(replace(DEFAULT, time_step_ms=0.06), speed)
         lines.append(row_of([f"{speed}", f"{step:.3f}"], extremes(DEFAULT, speed), exact))
     return [*lines, ""]

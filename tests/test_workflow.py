@@ -17,7 +17,7 @@ run: test
 train: {n_cars: 1}
 guideway: {n_spans: 1}
 irregularity: {n_harmonics: 50, wavelength_max: 20 m}
-study: {mcm: {n_samples: 4, chunk_size: 2}}
+study: {mcm: {n_samples: 4, chunk_size: 2}, tracks: {n_tracks: 3, n_gains: 16}}
 cases:
   validation: {n_spans: 1}
   only_suspension_proportional: null
@@ -96,6 +96,7 @@ def test_a_dry_run_of_all_lists_every_step_of_the_method(fresh):
         "fig7": 1, "fig8": 1, "histories": 1, "gaps": 1, "modes": 1, "all": 1,
         "fig9": 1, "fig10": 1, "fig11": 1, "fig12": 1, "fig15": 1, "fig16": 1, "fig_sobol": 1,
         "fig_stability": 1, "fig_accuracy": 1, "fig_scatter": 1, "fig_track_split": 1,
+        "tracks": 1, "line": 1, "fig_tracks": 1, "fig_track_limits": 1,
     }.items()  # fmt: skip
     assert fresh.would_run() == jobs
 

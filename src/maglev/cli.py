@@ -172,6 +172,7 @@ def _run(stage: Stage) -> Callable[..., None]:
                 inputs[f"{role}_{words}"] = path
         taken = {name: given[name] for name in stage.takes}
         result = stage.compute(view, **taken, **files)
+        result.attrs = {**_of_track(files), **result.attrs}
         stage.write(result, out, parameters, inputs, **of)
         if stage.table is not None:
             from maglev.stages import tables
@@ -180,6 +181,17 @@ def _run(stage: Stage) -> Callable[..., None]:
             tables.write(out.with_suffix(""), rows, text, demonstration=parameters.demonstration)
 
     return run
+
+
+def _of_track(files: dict[str, Any]) -> dict[str, str]:
+    """Of which track a file is that is made of others, where they say it."""
+    every = [
+        one
+        for found in files.values()
+        for one in (found.values() if isinstance(found, dict) else [found])
+    ]
+    words = dict.fromkeys(one.attrs["track"] for one in every if "track" in one.attrs)
+    return {"track": "; ".join(words)} if words else {}
 
 
 def _files(stage: Stage, given: dict[str, Any]) -> dict[str, Any]:

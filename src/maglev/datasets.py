@@ -517,6 +517,68 @@ def _study_table() -> dict[str, Variable]:
             "interaction_share",
             _number("response", "1", "share of the variance that gains and track have together"),
         ),
+        # the line and its tracks
+        "track": _number("track", "1", "number of the track", "int32"),
+        "seed_of_track": _number("track", "1", "seed of the irregularity of the track", "int64"),
+        "extreme": _number("track sample response", OF_RESPONSE, "largest absolute response"),
+        "status_on_track": _code("track sample", "how the passage ended", STATUS),
+        "density_of_track": _number(
+            "track response cell",
+            PER_RESPONSE,
+            "probability density of the extreme on the track, gains random, direct",
+        ),
+        "density_of_line": _number(
+            "response cell",
+            PER_RESPONSE,
+            "probability density of the extreme, gains and track random: mean over the tracks",
+        ),
+        "mean_on_track": _number(
+            "track response", OF_RESPONSE, "mean of the extreme on the track, gains random"
+        ),
+        "deviation_on_track": _number(
+            "track response", OF_RESPONSE, "standard deviation due to the gains on the track"
+        ),
+        "skewness_on_track": _number(
+            "track response", "1", "skewness of the extreme on the track, gains random"
+        ),
+        "deviation_of_track": _number(
+            "response", OF_RESPONSE, "standard deviation of the means on the tracks"
+        ),
+        "first_order_on_track": _number(
+            "track response parameter", "1", "first-order Sobol' index of the gain on the track"
+        ),
+        **_with_ends(
+            "held_limit_on_track",
+            _number(
+                "track response failure_probability",
+                OF_RESPONSE,
+                "limit on the track that is exceeded with the failure probability given that "
+                "levitation holds",
+            ),
+        ),
+        "held_limit_on_track_status": _code(
+            "track response failure_probability", "what can be said of the limit", LIMIT_STATUS
+        ),
+        "narrow_limit_on_track": _number(
+            "track response failure_probability",
+            OF_RESPONSE,
+            "the same limit for gains that vary 0.4 times as much",
+        ),
+        **_with_ends(
+            "held_limit_of_line",
+            _number(
+                "response failure_probability",
+                OF_RESPONSE,
+                "limit of gains and track both random that is exceeded with the failure "
+                "probability given that levitation holds",
+            ),
+        ),
+        "held_limit_of_line_status": _code(
+            "response failure_probability", "what can be said of the limit", LIMIT_STATUS
+        ),
+        "lost_share_on_track": _number(
+            "track", "1", "share of the points of the gains at which levitation is lost"
+        ),
         # what figures show of several files
         "curve": _number(
             "curve", "1", "file that is shown by case and method, see flag_meanings", "int32"
@@ -890,6 +952,31 @@ LAYOUTS: Mapping[str, Layout] = {
             "n_runs",
         ),
     ),
+    "tracks": Layout(
+        title="Extremes of the same gains on each of many tracks",
+        variables=(*GAINS, "standard", "seed_of_track", "extreme", "status_on_track"),
+    ),
+    "line": Layout(
+        title="What holds on the line, and what on one of its tracks",
+        variables=(
+            "seed_of_track",
+            "value",
+            "density_of_track",
+            "density_of_line",
+            *_ends("gains_share", "track_share", "interaction_share"),
+            "mean_on_track",
+            "deviation_on_track",
+            "skewness_on_track",
+            "deviation_of_track",
+            "first_order_on_track",
+            *_ends("held_limit_on_track", "held_limit_of_line"),
+            "held_limit_on_track_status",
+            "held_limit_of_line_status",
+            "narrow_limit_on_track",
+            "lost_share_on_track",
+            "n_runs",
+        ),
+    ),
     "table1": Layout(
         title="Limits of the extremes by each method",
         variables=(
@@ -1026,6 +1113,12 @@ def provenance(
     if config.get("demonstration"):
         attributes["title"] = f"{attributes['title']} (demonstration, not a result)"
     return attributes
+
+
+def carried(dataset: xr.Dataset) -> dict[str, Any]:
+    """What a file made of another says of its passages too: their steps and their track."""
+    kept = ("time_step", "n_steps", "track")
+    return {name: dataset.attrs[name] for name in kept if name in dataset.attrs}
 
 
 def write(

@@ -1046,6 +1046,26 @@ class TailDesign(Parameters):
     surrogate: SurrogateKind = Field("best", description="surrogate of the finished design")
 
 
+class Tracks(Parameters):
+    """The line: one set of gains on each of many tracks of the same spectra."""
+
+    n_tracks: int = _count(
+        32, "number of tracks; the first is that of the seed of the configuration", minimum=3
+    )
+    n_gains: int = _count(
+        256, "Sobol' points of the gains, the same on every track; a power of two", minimum=16
+    )
+    surrogate: SurrogateKind = Field(
+        "kriging", description="surrogate of the runs on each track, for its limits"
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Tracks:
+        if self.n_gains & (self.n_gains - 1):
+            raise ValueError(f"n_gains must be a power of two, got {self.n_gains}")
+        return self
+
+
 class Study(Parameters):
     """How densities and limits are found, for all cases."""
 
@@ -1068,6 +1088,7 @@ class Study(Parameters):
     osm: OneStage = OneStage()
     asm_paper: PaperDesign = PaperDesign()
     asm: TailDesign = TailDesign()
+    tracks: Tracks = Tracks()
 
     @model_validator(mode="after")
     def _check(self) -> Study:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Literal
 
@@ -11,9 +11,10 @@ import numpy.typing as npt
 import xarray as xr
 
 from maglev import datasets, profiles
+from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import n_steps, time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile, profile
 from maglev.mechanics.responses import GIRDER_RESPONSES, Passages, checked_gains
 from maglev.parameters import Config
@@ -39,8 +40,9 @@ def simulate(
     ----------
     config
         Parameters of everything, from `maglev.load_config`.
-    gains : (sample, 4)
-        Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m].
+    gains : (sample, 4) or (sample, 8)
+        Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m]; then suspension k_a
+        [A s²/m], k_i [A/(m s)], guidance k_a, k_i, those of ``config.gains`` if left out.
     histories
         Whether to keep the time series of responses, gaps and currents.
     solver
@@ -60,8 +62,10 @@ def simulate(
         Layout ``passage`` of `maglev.datasets`: on ``sample`` the extremes of the six responses
         [m, m s-2] and their times [s], gaps [m], currents [A], ``status`` and where and when
         levitation was lost; with ``histories`` also the time series on ``t``.  The extremes of a
-        lost sample are NaN.  Attributes ``time_step`` [s] and ``n_steps``; of the reference solver
-        also ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
+        lost sample are NaN, as are those of a sample whose gains ask for a smaller step, which is
+        not judged (status ``step_too_large``).  Attributes ``time_step`` [s], ``n_steps`` and
+        ``track``, the words for the track that the numbers are of; of the reference solver also
+        ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
 
     Raises
     ------
@@ -82,10 +86,12 @@ def simulate(
     if solver not in ("production", "reference"):
         raise ValueError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
-    every = max(1, int(HISTORY_INTERVAL / time_step(config) * (1 + 1e-9))) if histories else 0
+    every = (
+        max(1, int(HISTORY_INTERVAL / course(config).time_step * (1 + 1e-9))) if histories else 0
+    )
     if solver == "production":
         passages = integrate.integrate(
-            _system(config),
+            _system(config, _track_file_hash(config)),
             gains,
             profile_of=None if seeds is None else lambda k: track(config, seeds[k]),
             record_every=every,
@@ -99,6 +105,7 @@ def simulate(
             config, track(config), gains, record_interval=HISTORY_INTERVAL if histories else None
         )
     found = _dataset(config, gains, passages, histories)
+    found.attrs["track"] = track_words(config, seeds)
     if solver == "reference":
         found.attrs |= effort.attributes
     return datasets.describe(found)
@@ -127,6 +134,25 @@ def track(config: Config, seed: int | None = None) -> Profile:
     return profile(irregularity, track_range(config), chosen, measured)
 
 
+def track_words(config: Config, seeds: Sequence[int] | None = None) -> str:
+    """Of which track numbers are, in words.
+
+    Parameters
+    ----------
+    config
+        Parameters of everything.
+    seeds
+        Of the tracks of samples that have each their own.
+    """
+    if not config.irregularity.enabled:
+        return "smooth track"
+    if config.irregularity.profile_file is not None:
+        return "measured track"
+    if seeds is not None:
+        return "a track of its own for every passage"
+    return f"track of seed {config.seed}"
+
+
 def _checked_seeds(track_seeds: npt.ArrayLike, n_samples: int, solver: str) -> list[int]:
     seeds = np.asarray(track_seeds)
     if seeds.shape != (n_samples,) or seeds.dtype.kind not in "iu" or (seeds < 0).any():
@@ -142,15 +168,23 @@ def _checked_seeds(track_seeds: npt.ArrayLike, n_samples: int, solver: str) -> l
     return [int(seed) for seed in seeds]
 
 
+def _track_file_hash(config: Config) -> str:
+    """Hash of the measured irregularity; empty where there is none."""
+    irregularity = config.irregularity
+    name = irregularity.profile_file if irregularity.enabled else None
+    return file_hash(name) if name else ""
+
+
 @lru_cache(maxsize=2)
-def _system(config: Config) -> integrate.System:
+def _system(config: Config, _track_file: str) -> integrate.System:
+    """What passages of a configuration stand on, kept for the next call with the same track."""
     return integrate.prepare(config, track(config))
 
 
 def _dataset(
     config: Config, gains: npt.NDArray[np.float64], passages: Passages, histories: bool
 ) -> xr.Dataset:
-    one = ("sample",)
+    one, way = ("sample",), course(config)
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)
     }
@@ -192,5 +226,5 @@ def _dataset(
     return xr.Dataset(
         variables,
         coords=coordinates,
-        attrs={"time_step": time_step(config), "n_steps": n_steps(config)},
+        attrs={"time_step": way.time_step, "n_steps": way.n_steps},
     )

@@ -216,6 +216,38 @@ def track_split():
     return _filled("track_split", {"response": 6, "cell": z.size}, **given)
 
 
+def line(n=5):
+    """Tracks whose means differ by three of their deviations."""
+    rng = np.random.default_rng(4)
+    z = np.linspace(-12, 12, 301)
+    place = 3 * rng.standard_normal((n, 6))
+    of = stats.norm.pdf(z - place[:, :, None]) / WIDTH[:, None]
+    held = CENTRE[:, None] + WIDTH[:, None] * (place[:, :, None] + stats.norm.isf(LEVELS))
+    half = 0.3 * WIDTH[:, None]
+    by_track = ("track", "response", "failure_probability")
+    given = {
+        "value": (("response", "cell"), CENTRE[:, None] + WIDTH[:, None] * z),
+        "density_of_track": (("track", "response", "cell"), of),
+        "density_of_line": (("response", "cell"), of.mean(axis=0)),
+        "mean_on_track": (("track", "response"), CENTRE + WIDTH * place),
+        "deviation_on_track": (("track", "response"), np.tile(WIDTH, (n, 1))),
+        "held_limit_on_track": (by_track, held),
+        "held_limit_on_track_low": (by_track, held - half),
+        "held_limit_on_track_high": (by_track, held + half),
+        "held_limit_of_line": (by_track[1:], held.mean(axis=0)),
+        "held_limit_of_line_low": (by_track[1:], held.mean(axis=0) - 3 * half),
+        "held_limit_of_line_high": (by_track[1:], np.full((6, 3), np.inf)),
+        "held_limit_of_line_status": (by_track[1:], np.tile([0, 1, 1], (6, 1))),
+        "seed_of_track": ("track", np.arange(20, 20 + n)),
+        "n_runs": ((), 80),
+    }
+    for name, share in (("gains", 0.1), ("track", 0.8), ("interaction", 0.1)):
+        for end, by in (("", 0.0), ("_low", -0.05), ("_high", 0.05)):
+            given[f"{name}_share{end}"] = ("response", np.full(6, share + by))
+    sizes = {"track": n, "response": 6, "cell": z.size, "failure_probability": 3, "parameter": 4}
+    return _filled("line", sizes, **given).assign_attrs(track=f"{n} tracks")
+
+
 def write(folder, layout, dataset, *, case, method=None, variation=0.1, demonstration=False):
     """Write a file as its stage would and return its name."""
     path = folder / f"{layout}_{case}_{method}.nc"
@@ -280,4 +312,6 @@ def study(folder, demonstration=False):
         "accuracy": [accurate],
         "scatter": [baseline],
         "track_split": [one("track_split", track_split())],
+        "tracks": [one("line", line())],
+        "track_limits": [one("line", line())],
     }

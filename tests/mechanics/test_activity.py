@@ -1,5 +1,6 @@
 """Which coordinates of the guideway are stepped when, and what it costs to leave some alone."""
 
+from dataclasses import replace
 from functools import lru_cache
 from unittest import mock
 
@@ -10,7 +11,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from maglev.mechanics import (
     _kernels,
     activity,
-    course,
     guideway,
     integrate,
     irregularity,
@@ -18,7 +18,7 @@ from maglev.mechanics import (
     reduction,
 )
 from maglev.mechanics._records import Motion
-from maglev.mechanics.course import first_step, n_steps, nose, start, time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
 
@@ -68,10 +68,10 @@ def test_the_lower_the_modes_that_quiet_spans_keep_the_larger_the_error():
 
 def test_spans_under_the_train_and_beside_it_are_awake_and_so_is_the_middle_one():
     length, n_spans = LINE.guideway.span_length, LINE.guideway.n_spans
-    starts = [stage.first_step for stage in stages()] + [n_steps(LINE) + 1]
+    starts = [stage.first_step for stage in stages()] + [course(LINE).n_steps + 1]
     assert np.all(np.diff(starts) > 0)
     for stage, begin, end in zip(stages(), starts, starts[1:], strict=False):
-        places = nose(LINE, np.array([begin, end - 1]) * time_step(LINE))
+        places = course(LINE).nose(np.array([begin, end - 1]) * course(LINE).time_step)
         tail = int(np.floor((places[0] - LINE.train.length) / length))
         head = int(np.floor(places[1] / length))
         reach = range(tail - activity.AWAKE_BESIDE, head + activity.AWAKE_BESIDE + 1)
@@ -91,7 +91,11 @@ def test_most_of_a_long_line_is_not_stepped():
 
 def test_the_guideway_rests_until_the_nose_reaches_it():
     first = stages()[0].first_step
-    assert nose(LINE, first * time_step(LINE)) >= 0 > nose(LINE, (first - 1) * time_step(LINE))
+    assert (
+        course(LINE).nose(first * course(LINE).time_step)
+        >= 0
+        > course(LINE).nose((first - 1) * course(LINE).time_step)
+    )
 
 
 def test_tops_that_modes_follow_have_their_mass():
@@ -122,7 +126,7 @@ def stepped_periods(step):
     config = config.model_copy(
         update={"passage": config.passage.model_copy(update={"speed": 0.258 / 4 / step})}
     )
-    assert_allclose(time_step(config), step, rtol=1e-9)
+    assert_allclose(course(config).time_step, step, rtol=1e-9)
     passage = config.passage
     reduced = reduction.reduce(
         guideway.build(config.guideway), passage.mode_cutoff, passage.mode_cutoff_elsewhere
@@ -194,8 +198,8 @@ def test_coordinates_that_fall_quiet_are_left_at_rest():
 def test_poles_meet_the_joints_half_way_between_steps():
     for speed in ("430 km/h", "217 km/h"):
         config = Config.model_validate({"passage": {"speed": speed}})
-        advance = config.passage.speed * time_step(config)
-        assert -config.passage.approach - advance < start(config) <= -config.passage.approach
+        advance = config.passage.speed * course(config).time_step
+        assert -config.passage.approach - advance < course(config).start <= -config.passage.approach
         system = integrate.prepare(
             config, irregularity.profile(config.irregularity, track_range(config), config.seed)
         )
@@ -217,11 +221,12 @@ def test_the_train_rests_until_it_meets_the_track():
     profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
     gains = np.array([config.gains.as_row])
     found = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
-    with mock.patch.object(packing, "first_step", lambda _: 1):
+    from_the_start = replace(course(config), first_step=1)
+    with mock.patch.object(packing, "course", lambda _: from_the_start):
         whole = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
-    first = first_step(config)
-    assert nose(config, (first + 1) * time_step(config)) > -10.0
-    assert nose(config, (first - 1) * time_step(config)) <= -10.0
+    first = course(config).first_step
+    assert course(config).nose((first + 1) * course(config).time_step) > -10.0
+    assert course(config).nose((first - 1) * course(config).time_step) <= -10.0
     for name in ("girder", "body_z", "body_y", "gap_min", "gap_max", "current_max"):
         assert_allclose(getattr(found, name), getattr(whole, name), rtol=1e-9, err_msg=name)
     assert_allclose(found.gap_history, whole.gap_history, rtol=0, atol=1e-12)
@@ -232,4 +237,4 @@ def test_the_train_rests_until_it_meets_the_track():
 def test_an_even_number_of_steps_goes_into_the_pole_passing_where_kinds_stand_half_a_pitch_apart():
     period = 0.258 / (430 / 3.6)
     odd = Config.model_validate({"passage": {"time_step": f"{period / 5 * 1.001} s"}})
-    assert_allclose(period / course.time_step(odd), 6, rtol=1e-9)
+    assert_allclose(period / course(odd).time_step, 6, rtol=1e-9)

@@ -1,7 +1,7 @@
 """Poles with a length: the rail's mean under a face, its rate, and what faces do to a passage."""
 
-import itertools
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -84,7 +84,7 @@ def test_the_mean_is_the_integral_of_the_motion_under_the_part_that_is_on_the_gu
     for k, middle in enumerate(x):
         near, far = np.clip([middle - 0.5 * length, middle + 0.5 * length], 0, LINE.length)
         cuts = np.unique([near, *NODES[(NODES > near) & (NODES < far)], far])
-        for low, high in itertools.pairwise(cuts):
+        for low, high in pairwise(cuts):
             inside = 0.5 * (low + high) + 0.5 * (high - low) * gauss
             expected[k] += 0.5 * (high - low) * share @ motion_at(inside, motion, lateral)
     assert_allclose(found, expected / length, rtol=0, atol=1e-12 * np.abs(motion).max())

@@ -28,6 +28,7 @@ MAPPING = {
         "osm": {"n_runs": 16},
         "asm_paper": {"n_initial": 12, "n_candidates": 16, "n_largest": 16, "batch_size": 4},
         "asm": {"n_initial": 12, "n_candidates": 32, "n_largest": 16, "batch_size": 4},
+        "tracks": {"n_tracks": 3, "n_gains": 16},
     },
     "cases": {
         "validation": {"n_spans": 1, "coefficient_of_variation": 0.02},

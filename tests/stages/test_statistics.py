@@ -116,7 +116,7 @@ def test_the_interval_of_a_limit_is_made_of_the_errors_near_it():
     training = np.linspace(-3.0, 3.0, 200)
     size = np.where(training > 1.9, 0.5, 0.01)
     residuals = size * np.where(np.arange(200) % 2, 1.0, -1.0)
-    found = limits._surrogate_limits(CONFIG, predictions, training, residuals, {})
+    found = limits.limits_off(CONFIG, predictions, training, residuals, {})
     half = 0.5 * (found.upper - found.lower)
     assert half[0] < 0.1 and half[2] > 0.5
 

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
 
 from maglev.uncertainty.reliability import (
+    clustered_limits,
     error_range_near,
     exceedance,
     sample_limits,
@@ -194,3 +195,27 @@ def test_an_error_range_moves_both_ends_of_a_surrogate_limit():
     assert_allclose(moved.upper - plain.upper, 0.5)
     with pytest.raises(ValueError, match="must be finite and ascend"):
         surrogate_limits(predictions, [0.1], error_range=(1.0, 0.0))
+
+
+@pytest.mark.parametrize("within", [0.1, 1.0])
+def test_a_limit_over_clusters_knows_that_clusters_are_few(within):
+    rng = np.random.default_rng(6)
+    exact = stats.norm.isf(0.1) * np.hypot(1.0, within)
+    inside, widths = [], []
+    for _ in range(150):
+        values = rng.standard_normal((32, 1)) + within * rng.standard_normal((32, 64))
+        found = clustered_limits(values, [0.1, 0.01])
+        assert found.status == ("given", "too_few_exceedances")
+        inside.append(found.lower[0] <= exact <= found.upper[0])
+        widths.append(found.upper[0] - found.lower[0])
+    assert np.mean(inside) > 0.91  # 0.95 is claimed
+    assert np.mean(widths) < 2.0
+
+
+def test_a_limit_over_equal_clusters_is_that_of_all_samples():
+    values = np.random.default_rng(7).standard_normal((40, 500))
+    found, plain = clustered_limits(values, [0.1]), sample_limits(values.ravel(), [0.1])
+    assert_allclose(found.limit, plain.limit)
+    assert_allclose(found.upper - found.lower, plain.upper - plain.lower, rtol=0.6)
+    with pytest.raises(ValueError, match="at least two clusters"):
+        clustered_limits(values[:1], [0.1])

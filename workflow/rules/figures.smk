@@ -88,6 +88,16 @@ DRAWN = {
         "how the six responses go together",
         of_baseline("baseline"),
     ),
+    "fig_tracks": (
+        "tracks",
+        "densities on each of many tracks, and of the line",
+        of_line(),
+    ),
+    "fig_track_limits": (
+        "track_limits",
+        "limits on each of many tracks, and of the line",
+        of_line(),
+    ),
     "fig_track_split": (
         "track_split",
         "what random gains and a random track contribute",

@@ -24,13 +24,15 @@ FILES = {
     "limits": "{case}/{method}/limits.nc",
     "accuracy": "{case}/accuracy.nc",
     "prediction": "{case}/prediction.nc",
+    "tracks": "track/tracks.nc",
+    "line": "tables/line.nc",
     "table1": "tables/table1.nc",
     "paper_and_ours": "tables/paper_and_ours.nc",
     "statistics_check": "checks/{scope}.nc",
 }
 
 # jobs that run passages at the same time
-THREADS = {"dynamic_factor": 2}
+THREADS = {"dynamic_factor": 2, "tracks": 2}
 
 
 for stage in STAGES.values():

@@ -41,9 +41,23 @@ def of_last_method(cases: list[str], *stages: str) -> list[str]:
     ]
 
 
+def on_tracks(case: str) -> bool:
+    """Whether the case exists and its track is drawn, so that there can be others."""
+    track = parameters.irregularity
+    drawn = track.enabled and track.profile_file is None
+    return case in parameters.cases and case not in TRACK_CASES and drawn
+
+
+def of_line() -> list[str]:
+    """The file of the line, if there are tracks of the case of the tables."""
+    return [place("line")] if on_tracks(TABLE_CASE) else []
+
+
 def possible(stage, case: str) -> bool:
     """Whether a case has what a stage of it needs: methods, and a random track for its parts."""
     of_track = "track_runs" in (stage.name, *stage.inputs)
+    if "tracks" in (stage.name, *stage.inputs) and not on_tracks(case):
+        return False
     needed = [STAGES[role] for role, one in stage.inputs.items() if not one.optional]
     return (case in TRACK_CASES or not of_track) and all(
         methods_of(case, one.methods) for one in (stage, *needed)

@@ -25,6 +25,8 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "accuracy": ("accuracy",),
     "scatter": ("runs",),
     "track_split": ("track_split",),
+    "tracks": ("line",),
+    "track_limits": ("line",),
 }
 """Every figure with the layouts of the files that it is drawn from, in order.
 
@@ -101,6 +103,9 @@ def draw(name: str, data: Sequence[str | Path], out: str | Path) -> None:
     demonstration = any(one.attrs.get("demonstration") == "yes" for one in read)
     with style.page():
         figure, plotted = import_module(f"maglev.figures.{name}").figure(*arguments)
+        words = dict.fromkeys(one.attrs["track"] for one in read if "track" in one.attrs)
+        if words:
+            style.say_track(figure, "; ".join(words))
         if demonstration:
             style.mark_demonstration(figure)
         style.save(figure, Path(out))

@@ -141,6 +141,11 @@ def below(
     )
 
 
+def say_track(figure: Figure, words: str) -> None:
+    """Write over a figure of which track its numbers are."""
+    figure.suptitle(words, x=0.995, ha="right", fontsize=6.5, color="#555555")
+
+
 def mark_demonstration(figure: Figure) -> None:
     """Write 'demonstration' across a figure that shows no result."""
     figure.text(

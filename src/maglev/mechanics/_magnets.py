@@ -123,7 +123,7 @@ def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
                 signal = signal + fast
             command = at_rest + signal
         else:
-            command = fma(proportional, error, fma(derivative, rate, at_rest))
+            command = at_rest + fma(proportional, error, derivative * rate)  # the same bits
         command = maximum(minimum(command, rows.current_max), 0.0)
         if law.decay > 0.0:
             current = load(circuits.current, here) * law.decay

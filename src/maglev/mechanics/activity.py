@@ -16,7 +16,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from maglev.mechanics.course import n_steps, nose, time_step
+from maglev.mechanics.course import course
 from maglev.mechanics.reduction import ReducedGuideway
 from maglev.parameters import Config
 
@@ -67,8 +67,9 @@ def stages(config: Config, reduced: ReducedGuideway) -> list[Stage]:
         In order; what is awake or stepped differs from each to the next.
     """
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
-    step = np.arange(1, n_steps(config) + 1)
-    at = nose(config, step * time_step(config))
+    way = course(config)
+    step = np.arange(1, way.n_steps + 1)
+    at = way.nose(step * way.time_step)
     step, at = step[at >= 0], at[at >= 0]
     ahead = np.minimum(np.floor(at / length).astype(int) + AWAKE_BESIDE, n_spans - 1)
     behind = np.floor((at - config.train.length) / length).astype(int) - AWAKE_BESIDE

@@ -25,7 +25,7 @@ from maglev.mechanics._records import (
     Run,
     Vehicle,
 )
-from maglev.mechanics.course import time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.linear import Block
@@ -112,7 +112,7 @@ def prepare(config: Config, profile: Profile) -> System:
         grounds=grounds,
         line=packing.line(reduced, config),
         parts=parts,
-        safe_gains=safe_gains(parts, _mean_gains(config), time_step(config)),
+        safe_gains=safe_gains(parts, _mean_gains(config), course(config).time_step),
         config=config,
     )
 
@@ -216,7 +216,7 @@ def integrate(
 
 def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ...]) -> None:
     """Refuse a step at which the guideway, or the train at its mean gains, would grow by itself."""
-    dt, gains = time_step(config), _mean_gains(config)
+    dt, gains = course(config).time_step, _mean_gains(config)
     limit = guideway_limit(config, reduced, dt)
     if not step_holds(parts, gains, dt):
         limit = min(limit, train_limit(parts, gains))

@@ -23,7 +23,7 @@ from maglev.mechanics._records import (
 )
 from maglev.mechanics.activity import Stage, stages, stepped_mass, top_stiffness
 from maglev.mechanics.control import grouping, late_current
-from maglev.mechanics.course import first_step, n_steps, start, time_step
+from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile, mean_displacement
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import ReducedGuideway, face_weights, standing_sag
@@ -183,20 +183,20 @@ def places(
     reduced: ReducedGuideway,
 ) -> tuple[Places, Ground]:
     """Tabulate what the poles meet after whole numbers of steps; no track yet."""
-    advance = config.passage.speed * time_step(config)
-    begins = (rows.x[:, None] + rows.offset + start(config)) / advance
+    way = course(config)
+    begins = (rows.x[:, None] + rows.offset + way.start) / way.advance
     whole = np.floor(begins + 1e-6)
     beyond = np.round(begins - whole, 6)  # share of a step; places with the same one form a series
     series = np.unique(beyond)
     earliest = int(whole.min())
-    count = int(whole.max()) - earliest + n_steps(config) + 1
+    count = int(whole.max()) - earliest + way.n_steps + 1
     number = (whole - earliest).astype(np.int64) + count * np.searchsorted(series, beyond)
-    x = ((earliest + np.arange(count) + series[:, None]) * advance).ravel()
+    x = ((earliest + np.arange(count) + series[:, None]) * way.advance).ravel()
     magnet = _magnet(config, rows)
     faces = face_weights(
-        config.guideway, x, magnet.pole_length, lateral=rows.is_guidance, advance=advance
+        config.guideway, x, magnet.pole_length, lateral=rows.is_guidance, advance=way.advance
     )
-    sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x, advance)
+    sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x, way.advance)
     apart = np.array([1.0, -1.0 if rows.is_guidance else 1.0])
     nothing = np.zeros((x.size, 2, 1))
     tabulated = Places(
@@ -276,6 +276,7 @@ def _standing_sag(
 
 def line(reduced: ReducedGuideway, config: Config) -> Line:
     """Guideway for the kernels."""
+    way = course(config)
     columns, n = reduced.span_coordinates, reduced.n_modes
     rails = [
         [_relative(reduced, span, shapes[span]) for span in range(len(columns))]
@@ -301,7 +302,7 @@ def line(reduced: ReducedGuideway, config: Config) -> Line:
     upright, sideways = moving(rails[0]), moving(*rails[1:])
     upright_start, upright_column = numbered(upright)
     sideways_start, sideways_column = numbered(sideways)
-    response = step_response(reduced, time_step(config))
+    response = step_response(reduced, way.time_step)
     middle = reduced.parameters.n_spans // 2
     midspan = np.stack(
         [_relative(reduced, middle, shape) for shape in (reduced.midspan_z, reduced.midspan_y)]
@@ -311,7 +312,7 @@ def line(reduced: ReducedGuideway, config: Config) -> Line:
     of_passage = stages(config, reduced)
     always = np.logical_and.reduce([stage.stepped for stage in of_passage])
     damping_start, damping_column, damping = _rows(
-        _whole_and_short(_stepped_damping(reduced, time_step(config)), always)
+        _whole_and_short(_stepped_damping(reduced, way.time_step), always)
     )
     taken_start, taken_mode, taken = _rows(
         _whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
@@ -390,13 +391,14 @@ def _stages(
     """What is stepped in each stage, and where its whole or short rows of damping and of what modes
     take along begin and end."""
     n = reduced.n_modes
+    dt = course(config).time_step
     starts, tops_from, stepped, rows = [0], [], [], []
     factor_rows, factor_start, inverse = [], [0], []
     stilled = []
     before = np.zeros(reduced.n_coordinates, dtype=bool)
     for stage in of_passage:
         modes = np.flatnonzero(stage.stepped[:n])
-        tops, factor = stepped_mass(reduced, stage.stepped, time_step(config))
+        tops, factor = stepped_mass(reduced, stage.stepped, dt)
         coordinates = np.concatenate([modes, tops])
         stepped.append(coordinates)
         rows.append(coordinates + np.where(stage.awake[coordinates], 0, reduced.n_coordinates))
@@ -440,17 +442,17 @@ def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, Array]:
 
 def run(config: Config, record_every: int) -> Run:
     passage = config.passage
-    dt = time_step(config)
+    way = course(config)
     return Run(
-        first_step=first_step(config),
-        n_steps=n_steps(config),
-        time_step=dt,
+        first_step=way.first_step,
+        n_steps=way.n_steps,
+        time_step=way.time_step,
         speed=passage.speed,
-        start=start(config),
+        start=way.start,
         train_length=config.train.length,
         gap_contact=passage.gap_contact,
         gap_lost=passage.gap_lost,
-        sections=np.ascontiguousarray(acceleration_filter(passage, dt)),
+        sections=np.ascontiguousarray(acceleration_filter(passage, way.time_step)),
         record_every=record_every,
     )
 

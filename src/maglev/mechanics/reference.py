@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import first_step, time_step
+from maglev.mechanics.course import course
 from maglev.mechanics.course import n_steps as whole_steps
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.reference_magnets import Poles
@@ -48,6 +48,11 @@ MOST_HALVINGS = 5
 
 ERROR = 1e-3
 """Largest estimated error of an extreme, as a share of it [-]."""
+
+CAUTION = 0.5
+"""Estimated error of an extrapolated extreme, as a share of what extrapolation has changed [-].
+
+Where that was above 0.1 %, a fifth of it or less was left."""
 
 NEGLIGIBLE = 1e-3
 """Share of the vertical extreme below which a lateral one is not resolved for its own sake [-]."""
@@ -305,7 +310,8 @@ def passed(
     at = watch(config, model, of.poles)
     record = _blank(of, n_steps, n_steps // record_every if record_every else 0)
     state, fate = at_rest(of), record.fate
-    first = int((first_step(config) - 1) * time_step(config) / step)  # until then nothing moves
+    way = course(config)
+    first = int((way.first_step - 1) * way.time_step / step)  # until then nothing moves
     bar = tqdm(total=n_steps - first, disable=not progress, desc="reference", unit="step")
     for number, view in enumerate(views(of, first, n_steps), start=first):
         state = stepped(of, state, view, fate.status == 0)
@@ -377,7 +383,7 @@ def integrate(
         config,
         profile,
         gains,
-        time_step(config),
+        course(config).time_step,
         whole_steps(config),
         record_every=record_every,
         energy=True,
@@ -428,9 +434,9 @@ def solve(
     """Run one passage per row of gains with steps halved until the extremes stay.
 
     Newmark's rule is of second order, and so are the histories of a run: of two runs, with Δt and
-    Δt/2, a third of the difference is the error of the finer one and is taken off it.  That third
-    is also the estimate of what is left, until there are three runs: then what the third run has
-    changed is.
+    Δt/2, a third of the difference is the error of the finer one and is taken off it.  Half of that
+    third is the estimate of what is left, until there are three runs: then what the third run has
+    changed is, or an eighth of the third if that is more.
 
     Parameters
     ----------
@@ -467,8 +473,8 @@ def solve(
     """
     began, gains = perf_counter(), checked_gains(gains, config.gains.further)
     own = config.passage.model_copy(update={"time_step": FIRST_STEP})
-    step = time_step(config.model_copy(update={"passage": own}))
-    n_steps = math.ceil(whole_steps(config) * time_step(config) / step)
+    step = course(config.model_copy(update={"passage": own})).time_step
+    n_steps = math.ceil(whole_steps(config) * course(config).time_step / step)
     every = max(1, int(record_interval / step * (1 + 1e-9))) if record_interval else 0
     coarse = passed(config, profile, gains, step, n_steps, record_every=every, progress=progress)
     before = None
@@ -522,7 +528,7 @@ def _estimated_error(better: Array, fine: Array, before: Array | None) -> Array:
     before
         Extrapolated from steps twice as long, if there were any.
     """
-    error = np.abs(better - fine)
+    error = CAUTION * np.abs(better - fine)
     if before is not None:
         error = np.maximum(error / 4, np.abs(better - before))
     companion = better[:, [0, 0, 2, 2, 4, 4]]  # on smooth track nothing moves sideways

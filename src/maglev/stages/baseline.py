@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from maglev.datasets import carried
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.reads import RUNS_OF_CASE
@@ -53,7 +54,7 @@ def dataset(
         raise ValueError(f"the chunks must hold the samples 0 to {n - 1} once each, in order")
     if not np.array_equal(whole["standard"], points["standard"]):
         raise ValueError("the chunks must have been run at the points of the baseline; do it again")
-    whole.attrs = {name: chunks[0].attrs[name] for name in ("time_step", "n_steps")}
+    whole.attrs = carried(chunks[0])
     whole["probability"] = (("sample",), points["probability"].values)
     return whole
 

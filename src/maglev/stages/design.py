@@ -358,7 +358,7 @@ class _Design:
         ]
         whole = xr.merge(parts, compat="override", join="outer", combine_attrs="override")
         whole["round_index"] = (("sample",), state.round_index.astype(np.int32))
-        whole.attrs = {name: rounds[0].attrs[name] for name in ("time_step", "n_steps")}
+        whole.attrs = datasets.carried(rounds[0])
         whole.attrs["stopped"] = reason.replace("_", " ")
         return whole
 

@@ -156,7 +156,7 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
     }
     limits, held_limits = (
         [
-            _surrogate_limits(
+            limits_off(
                 config, predictions[:, response], training[:, response], residuals[:, response], of
             )
             for response in range(len(RESPONSES))
@@ -180,14 +180,26 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
     return result
 
 
-def _surrogate_limits(
+def limits_off(
     config: Config,
     predictions: FloatArray,
     training: FloatArray,
     residuals: FloatArray,
     losing: dict[str, Any],
 ) -> Limits:
-    """Limits of one response, each with the range of the surrogate's errors near it."""
+    """Limits of one response off a surrogate, each with the range of its errors near it.
+
+    Parameters
+    ----------
+    config
+        The configuration: levels and confidence.
+    predictions : (point,)
+        Of the surrogate, at equally likely points that are held [unit of the response].
+    training, residuals : (sample,)
+        Values of the runs and their leave-one-out residuals [unit].
+    losing
+        ``lost_probability`` and ``lost_interval``; empty for limits given that levitation holds.
+    """
     levels = config.study.failure_probability
     common = {**losing, "confidence": config.study.confidence}
     plain = surrogate_limits(predictions, levels, error_range=(0.0, 0.0), **common)

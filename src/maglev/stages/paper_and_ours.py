@@ -10,7 +10,7 @@ import xarray as xr
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import lost
-from maglev.stages.tables import markdown, number
+from maglev.stages.tables import markdown, number, of_track
 from maglev.vocabulary import DECISIONS, METHODS, RESPONSES, SOURCES
 
 RESPONSE = "girder_displacement_z"
@@ -128,6 +128,7 @@ def rows(table: xr.Dataset) -> list[dict[str, object]]:
                 continue
             found.append(
                 {
+                    "track": str(table.attrs.get("track", "")),
                     "quantity": column.attrs["long_name"],
                     "unit": column.attrs["units"],
                     "method": METHODS[method],
@@ -154,7 +155,9 @@ def text(table: xr.Dataset, heading: str) -> str:
     ]
     header = ["quantity", "method", "paper", "ours", "why different"]
     notes = "\n".join(f"{k}. {reason}." for k, reason in enumerate(reasons, start=1))
-    return f"# {heading}\n\n{markdown(header, body)}\nWhy different:\n\n{notes}\n"
+    return (
+        f"# {heading}\n\n{markdown(header, body)}\nWhy different:\n\n{notes}\n\n{of_track(table)}\n"
+    )
 
 
 def _or_none(value: float) -> float | str:

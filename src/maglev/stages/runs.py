@@ -217,7 +217,7 @@ def _gathered(places: Sequence[tuple[Path, int]]) -> xr.Dataset:
         combine_attrs="override",
     )
     chosen = whole.isel(sample=[offset[files[path]] + row for path, row in places])
-    chosen.attrs = {name: parts[0].attrs[name] for name in ("time_step", "n_steps")}
+    chosen.attrs = datasets.carried(parts[0])
     return chosen.assign_coords(sample=np.arange(len(places)))
 
 

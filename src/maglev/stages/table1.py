@@ -11,7 +11,7 @@ import xarray as xr
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, method_number
-from maglev.stages.tables import markdown, number
+from maglev.stages.tables import markdown, number, of_track
 from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, METHODS, RESPONSE_UNITS, RESPONSES
 
 _OF_METHOD = tuple(
@@ -86,6 +86,7 @@ def rows(table: xr.Dataset) -> list[dict[str, object]]:
                 found.append(
                     {
                         "response": response,
+                        "track": str(table.attrs.get("track", "")),
                         "unit": RESPONSE_UNITS[response],
                         "failure_probability": float(level),
                         "method": METHODS[code],
@@ -140,7 +141,7 @@ def text(table: xr.Dataset, heading: str) -> str:
         f"{markdown(header, [*body(''), ['levitation lost', '', *lost]])}\n"
         "The same given that levitation holds.\n\n"
         f"{markdown(header, body('held_'))}\n"
-        f"Limits: {notes[0]}.\n\nLost levitation: {notes[1]}.\n"
+        f"Limits: {notes[0]}.\n\nLost levitation: {notes[1]}.\n\n{of_track(table)}\n"
     )
 
 

@@ -7,7 +7,10 @@ import io
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def number(value: Any) -> str:
@@ -20,6 +23,17 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table in Markdown, ending with a line break."""
     lines = [header, ["---"] * len(header), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def of_track(found: xr.Dataset) -> str:
+    """Of which track the numbers of a file are, and where those of the line stand; a sentence."""
+    words = found.attrs.get("track", "")
+    if "seed" not in words:
+        return f"Our numbers are of: {words or 'tracks that the file does not name'}."
+    return (
+        f"Our numbers are of one track, the {words}, not of the line: `line.md` says what another "
+        "track changes."
+    )
 
 
 def csv_text(rows: Sequence[Mapping[str, object]]) -> str:

@@ -30,6 +30,11 @@ and no number is given."""
 _ROUNDING = 1e-12  # of a sum of probabilities, so that 1000 samples carry exactly one at 1e-3
 
 
+CLUSTERS_BEYOND = 3.0
+"""Expected clusters, such as tracks, at a level that they need to carry it; assumed: 32 tracks then
+carry 0.1.  The coverage is counted in a test."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """Limits of an extreme value: the smallest value whose exceedance is at most the level.
@@ -303,6 +308,89 @@ def surrogate_limits(
         upper=end(high, most, 1),
         expected_exceedances=np.maximum(n * held_level, 0.0),
         status=status,
+        confidence=confidence,
+    )
+
+
+def clustered_limits(
+    values: npt.ArrayLike,
+    failure_probability: npt.ArrayLike = FAILURE_PROBABILITIES,
+    *,
+    confidence: float = 0.95,
+) -> Limits:
+    """Limits of samples that come in equally likely clusters, such as the gains on some tracks.
+
+    The limit is that of all samples together.  How far it is known is decided by the number of
+    clusters: the exceedance at the limit is a mean over clusters with its own effective size, which
+    gives the exact binomial interval of the exceedance, and the limits at its ends are those of the
+    limit.
+
+    Parameters
+    ----------
+    values : (cluster, sample)
+        Extreme values [their unit].
+    failure_probability : (level,)
+        Failure probabilities [-].
+    confidence
+        Two-sided confidence [-].
+
+    Returns
+    -------
+    limits
+        One limit per level; ``expected_exceedances`` counts clusters.  Too few are less than
+        `CLUSTERS_BEYOND` of them.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two clusters, a value is not finite, or a level or the confidence
+        lies outside (0, 1).
+
+    References
+    ----------
+    Woodruff, J. Am. Stat. Assoc. 47 (1952) 635-646; Korn, Graubard, Surv. Methodol. 24 (1998)
+    193-201; docs/theory/reliability.md, eqs. (16) and (17).
+    """
+    values = np.asarray(values, dtype=float)
+    levels = _checked_levels(failure_probability)
+    _check_confidence(confidence)
+    if values.ndim != 2 or values.shape[0] < 2 or values.shape[1] < 1:
+        raise ValueError(
+            f"values have shape {values.shape}, expected (cluster, sample) with at least two "
+            "clusters"
+        )
+    ranked = np.sort(weighted_sample(values.ravel())[0])
+    n = values.shape[0]
+    carried = n * levels >= CLUSTERS_BEYOND
+
+    def at(level: float) -> float:
+        """The smallest value that at most a share of all samples exceeds."""
+        allowed = int(ranked.size * level * (1.0 + _ROUNDING))
+        return float(ranked[max(ranked.size - allowed - 1, 0)])
+
+    limit, lower, upper = np.full((3, levels.size), np.nan)
+    outside = 0.5 * (1.0 - confidence)
+    wider = (stats.norm.ppf(outside) / stats.t.ppf(outside, n - 1)) ** 2
+    for k in np.flatnonzero(carried):
+        limit[k] = at(levels[k])
+        of_cluster = (values > limit[k]).mean(axis=1)
+        p = of_cluster.mean()
+        variance = of_cluster.var(ddof=1) / n
+        size = values.size if variance == 0.0 else p * (1.0 - p) / variance
+        size = min(size * wider, values.size)
+        ends = (
+            stats.beta.ppf(outside, size * p, size * (1.0 - p) + 1.0),
+            stats.beta.ppf(1.0 - outside, size * p + 1.0, size * (1.0 - p)),
+        )
+        lower[k] = at(ends[1])
+        upper[k] = at(ends[0]) if n * ends[0] > 0.5 else np.inf
+    return Limits(
+        failure_probability=levels,
+        limit=limit,
+        lower=lower,
+        upper=upper,
+        expected_exceedances=n * levels,
+        status=tuple(GIVEN if one else TOO_FEW for one in carried),
         confidence=confidence,
     )
 

@@ -1,4 +1,4 @@
-"""How two independent groups of inputs share the variance of a response, by pick-freeze runs."""
+"""How two independent groups of inputs share the variance of a response: pick-freeze or crossed."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy import special, stats
 from scipy.stats import bootstrap
 
-from maglev.arrays import FloatArray, IntArray
+from maglev.arrays import BoolArray, FloatArray, IntArray
 
 N_RESAMPLES = 999
 """Bootstrap samples behind an interval; assumed, SciPy's own choice for such intervals."""
@@ -106,3 +107,121 @@ def _share(y: FloatArray, kept: FloatArray, axis: int) -> FloatArray:
     mean = 0.5 * (y + kept).mean(axis=axis)
     covariance = (y * kept).mean(axis=axis) - mean**2
     return covariance / (0.5 * (y**2 + kept**2).mean(axis=axis) - mean**2)
+
+
+def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
+    """Shares of the variance from runs of every first input on every second, each once.
+
+    The two-way analysis of variance with random effects: with the mean squares of n_a first and
+    n_b second inputs, ``s_ab = M_ab``, ``s_a = (M_a - M_ab) / n_b``, ``s_b = (M_b - M_ab) / n_a``.
+    Runs have no noise, so that what neither input explains alone is what they do together.
+
+    The intervals are those of the jackknife over either kind of input, their variances added, with
+    Student's quantile of the second inputs, of which there are few: of the logit of a share, or of
+    the share itself where leaving one out takes it out of (0, 1).  A bootstrap would draw an input
+    twice, and twins do nothing together.
+
+    Parameters
+    ----------
+    values : (second, first)
+        The response [its unit].
+    confidence
+        Two-sided confidence of the intervals [-].
+
+    Returns
+    -------
+    shares
+        Shares with their intervals.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than three second or two first inputs, a value is not finite, all are
+        equal or the confidence lies outside (0, 1).
+
+    References
+    ----------
+    Searle, Casella, McCulloch, Variance Components (1992), sec. 4.3; Arvesen, Schmitz, Biometrics
+    26 (1970) 677-686, for the jackknife; docs/theory/reliability.md, eqs. (14) and (15).
+    """
+    values = np.asarray(values, dtype=float)
+    if values.ndim != 2 or values.shape[0] < 3 or values.shape[1] < 2:
+        raise ValueError(
+            f"crossed runs have shape {values.shape}, expected (second, first) with at least three "
+            "second and two first inputs"
+        )
+    if not np.isfinite(values).all():
+        raise ValueError("crossed runs must be finite; leave inputs with a lost run out")
+    if np.ptp(values) == 0.0:
+        raise ValueError(f"crossed runs must differ, got {values[0, 0]} everywhere")
+    if not 0.0 < confidence < 1.0:
+        raise ValueError(f"confidence must lie in (0, 1), got {confidence}")
+    values = (values - values.mean()) / values.std()  # no cancellation
+    whole = _component_shares(values)
+    left_out = [
+        np.array([_component_shares(np.delete(values, k, axis)) for k in range(values.shape[axis])])
+        for axis in (0, 1)
+    ]
+    inside = np.logical_and.reduce(
+        [((one > 0.0) & (one < 1.0)).all(axis=0) for one in (*left_out, whole[None])]
+    )
+    at = _logit_where(inside, whole)
+    variance = np.zeros(3)
+    for without in left_out:
+        each, n = _logit_where(inside, without), without.shape[0]
+        variance += (n - 1) / n * np.square(each - each.mean(axis=0)).sum(axis=0)
+    half = stats.t.ppf(0.5 + 0.5 * confidence, values.shape[0] - 1) * np.sqrt(variance)
+    ends = [np.where(inside, special.expit(one), one) for one in (at - half, at + half)]
+    found = np.array([whole, *ends])
+    return Shares(first=found[:, 0], second=found[:, 1], interaction=found[:, 2])
+
+
+def _logit_where(inside: BoolArray, shares: FloatArray) -> FloatArray:
+    """The logit of some shares (…, share), the others as they are."""
+    safe = np.where(inside, shares, 0.5)
+    return np.where(inside, np.log(safe / (1.0 - safe)), shares)
+
+
+def _component_shares(values: FloatArray) -> FloatArray:
+    """Shares (first, second, together) of the components of variance of (second, first)."""
+    n_second, n_first = values.shape
+    of_first, of_second = values.mean(axis=0), values.mean(axis=1)
+    rest = values - of_first - of_second[:, None] + values.mean()
+    together = np.square(rest).sum() / ((n_first - 1) * (n_second - 1))
+    first = of_first.var(ddof=1) - together / n_second
+    second = of_second.var(ddof=1) - together / n_first
+    components = np.array([first, second, together])
+    return components / components.sum()
+
+
+N_BINS = 64
+"""Bins along an input in a first-order index; assumed, a few hundred points in each."""
+
+
+def first_order(points: npt.ArrayLike, values: npt.ArrayLike) -> FloatArray:
+    """First-order Sobol' indices from one set of many runs, by the means in bins of each input.
+
+    Parameters
+    ----------
+    points : (sample, parameter)
+        Equally likely independent inputs.
+    values : (sample, response)
+        Responses [their units].
+
+    Returns
+    -------
+    index : (response, parameter)
+        Variance of the means in ``N_BINS`` bins of equal numbers, over the variance [-].
+
+    References
+    ----------
+    Plischke, Reliab. Eng. Syst. Saf. 95 (2010) 354-360, the correlation ratio.
+    """
+    points, values = np.asarray(points, dtype=float), np.asarray(values, dtype=float)
+    size = points.shape[0] // N_BINS
+    index = np.empty((values.shape[1], points.shape[1]))
+    for k in range(points.shape[1]):
+        order = np.argsort(points[:, k], kind="stable")[: size * N_BINS]
+        means = values[order].reshape(N_BINS, size, -1).mean(axis=1)
+        index[:, k] = means.var(axis=0) / values[order].var(axis=0)
+    return index
