@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 _File = click.Path(path_type=Path)
 
 
+class _BadConfiguration(click.ClickException):
+    """A mistake in the configuration ends as one on the command line does."""
+
+    exit_code = 2
+
+
 class _Commands(click.Group):
     """The commands, those of stages made when asked for; a mistake ends with one sentence."""
 
@@ -54,9 +60,9 @@ class _Commands(click.Group):
                 raise
             from maglev.config import ConfigError
 
-            failure = click.ClickException(" ".join(str(error).split()))
-            failure.exit_code = 2 if isinstance(error, ConfigError) else 1
-            raise failure from error
+            sentence = " ".join(str(error).split())
+            failure = _BadConfiguration if isinstance(error, ConfigError) else click.ClickException
+            raise failure(sentence) from error
 
 
 @click.group(cls=_Commands)
@@ -113,7 +119,7 @@ def _command(stage: Stage) -> click.Command:
         return click.Option([flag(name), name], **settings)
 
     overlays = "Configuration file; given again, later files overlay earlier ones."
-    options = [option("config", _File, overlays, multiple=True)]
+    options: list[click.Parameter] = [option("config", _File, overlays, multiple=True)]
     if stage.of != "run":
         options.append(option("case", str, "Name of the case."))
     if stage.of == "method":
@@ -121,9 +127,9 @@ def _command(stage: Stage) -> click.Command:
     for role, one in stage.inputs.items():
         words = f"File of the layout '{one.layout}'."
         if one.by:
-            kind = (*[str] * len(one.by), _File)
+            types = (*[str] * len(one.by), _File)
             words = f"{' and '.join(one.by).capitalize()}, and file of the layout '{one.layout}'."
-            options.append(option(role, kind, words, multiple=True))
+            options.append(option(role, types, words, multiple=True))
         else:
             always = not one.optional and set(stage.methods) <= set(one.methods)
             options.append(option(role, _File, words, required=always))
@@ -138,8 +144,9 @@ def _command(stage: Stage) -> click.Command:
         elif name not in ("case", "method"):
             options.append(option(name, kind, f"Which {name}."))
     options.append(option("out", _File, "NetCDF file to write."))
-    words = summary(stage.name)
-    return click.Command(stage.command, params=options, help=words, callback=_run(stage))
+    return click.Command(
+        stage.command, params=options, help=summary(stage.name), callback=_run(stage)
+    )
 
 
 def _run(stage: Stage) -> Callable[..., None]:

@@ -79,7 +79,7 @@ class Variable:
     def attributes(self) -> dict[str, Any]:
         """The attributes that stand with the variable in a file."""
         if self.units in (OF_RESPONSE, PER_RESPONSE):
-            units = RESPONSE_UNITS.values()
+            units = list(RESPONSE_UNITS.values())
             if self.units == PER_RESPONSE:
                 units = [{"m": "m-1", "m s-2": "m-1 s2"}[unit] for unit in units]
             return {"long_name": self.long_name, "units_by_response": ", ".join(units)}

@@ -60,7 +60,7 @@ def _units() -> pint.UnitRegistry:
 def quantity(
     unit: str,
     meaning: str,
-    default: float | str,
+    default: float | str | None,
     *,
     source: str,
     confidence: Literal["H", "M", "L"],
@@ -93,7 +93,7 @@ def quantity(
     extra: dict[str, Any] = {"unit": unit, "source": source, "confidence": confidence}
     if isinstance(default, str):
         extra["written"] = default
-    bounds: dict[str, float] = {}
+    bounds: dict[str, Any] = {}
     if minimum is not None:
         bounds["ge"] = minimum
     if above is not None:
@@ -380,7 +380,7 @@ class Magnet(Parameters):
         None,
         source="A",
         confidence="L",
-    )  # type: ignore[arg-type]
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Magnet:
@@ -438,7 +438,7 @@ class Train(Parameters):
                 "current_reference": ["A", "L"],
             }
         },
-    )  # type: ignore[arg-type]
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Train:
@@ -537,7 +537,7 @@ class Rail(Parameters):
                 )
             }
         },
-    )  # type: ignore[arg-type]
+    )
     units_per_span: int = Field(
         8,
         description="functional units a span and side",

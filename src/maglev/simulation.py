@@ -208,7 +208,7 @@ def _dataset(
     variables["status"] = (one, passages.status)
     variables["lost_t"] = (one, passages.lost_time)
     variables["lost_magnet"] = (one, passages.lost_magnet)
-    coordinates = {"sample": np.arange(gains.shape[0]), "car": cars}
+    coordinates: dict[str, npt.NDArray] = {"sample": np.arange(gains.shape[0]), "car": cars}
     if histories:
         for k, name in enumerate(GIRDER_RESPONSES):
             variables[f"{name}_history"] = (("sample", "t"), passages.girder_history[:, k])

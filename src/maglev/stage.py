@@ -274,8 +274,8 @@ class View:
         self._place, self._files = place, files
 
     def _read(self, name: str) -> Any:
-        is_mapping = isinstance(self._section, Mapping)
-        value = self._section[name] if is_mapping else getattr(self._section, name)
+        section = self._section
+        value = section[name] if isinstance(section, Mapping) else getattr(section, name)
         if name in self._reads:
             return value
         prefix = f"{name}."
@@ -289,8 +289,8 @@ class View:
 
     def __getattr__(self, name: str) -> Any:
         section = self.__dict__.get("_section")
-        kind = type(section)
         if isinstance(section, Parameters):
+            kind = type(section)
             if name in kind.model_fields:
                 return self._read(name)
             found = getattr_static(kind, name, None)
@@ -298,7 +298,7 @@ class View:
                 return found.fget(self)
             if isinstance(found, FunctionType) and not name.startswith("_"):
                 return MethodType(found, self)
-        raise AttributeError(f"{kind.__name__} has no '{name}'")
+        raise AttributeError(f"{type(section).__name__} has no '{name}'")
 
     def __getitem__(self, name: str) -> Any:
         return self._read(name)

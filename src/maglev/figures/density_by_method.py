@@ -42,7 +42,7 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
 
     fig = Figure(figsize=(style.PAGE, 2.9), layout="constrained")
     axis, table = fig.subplots(1, 2, width_ratios=[1.0, 1.05])
-    looks = [
+    looks: list[style.Look] = [
         {**labels.METHOD_STYLE[name], "label": labels.PDEM[name], "lw": 1.6 - 0.3 * (name != "mcm")}
         for name in methods
     ]
@@ -83,7 +83,7 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         table,
         rows,
         (0.0, 0.33, 0.46, 0.60, 0.75, 0.89),
-        [str(look["color"]) for look in looks],
+        [look["color"] for look in looks],
         0.155,
     )
     style.titled(table, "b", "peaks against the noise of MCM")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from maglev.mechanics import timoshenko
 from maglev.mechanics.timoshenko import PITCH, ROLL, YAW, FloatArray, X, Y, Z
@@ -402,7 +402,7 @@ def damping(model: GuidewayModel, ratio: float, cutoff_hz: float) -> ModalDampin
     )
 
 
-def _factors(matrix: sparse.csc_array):
+def _factors(matrix: sparse.csc_array) -> SuperLU:
     """Factors of a symmetric matrix with pivots on the diagonal."""
     return splu(
         matrix,
@@ -458,7 +458,10 @@ def _span(guideway: Guideway) -> _Span:
     node_z = np.repeat([0.0, rail.z, rail.z], [n_girder, n_side, n_side])
     first = np.arange(n_girder - 1)
     girder = (first, first + 1)
-    rails = tuple((begin + element, begin + element + 1) for begin in (n_girder, n_girder + n_side))
+    right, left = (
+        (begin + element, begin + element + 1) for begin in (n_girder, n_girder + n_side)
+    )
+    rails = (right, left)
 
     # Full matrices, node by node.
     n_full = 6 * node_x.size
@@ -614,7 +617,9 @@ def _bearings(
         [span_start[:, np.newaxis] + end_dof[1], pier_start[1:, np.newaxis] + np.arange(6)]
     )
 
-    def summed(at_first: float, at_last: float, lateral: float, vertical: float):
+    def summed(
+        at_first: float, at_last: float, lateral: float, vertical: float
+    ) -> sparse.csr_array:
         blocks = []
         for longitudinal in (at_first, at_last):
             strength = np.tile([longitudinal, lateral, vertical], 2)
@@ -646,9 +651,9 @@ def _line(
     vertical, lateral = timoshenko.shear_flexibility(section, length)
 
     def plane(phi: FloatArray, displacement: int, rotation: int, sign: float) -> BeamPlane:
-        places = (6 * begin + displacement, 6 * begin + rotation)
-        places += (6 * end + displacement, 6 * end + rotation)
-        row = np.stack(places, axis=1)  # (element, 4) of span.motion
+        at_begin = (6 * begin + displacement, 6 * begin + rotation)
+        at_end = (6 * end + displacement, 6 * end + rotation)
+        row = np.stack([*at_begin, *at_end], axis=1)  # (element, 4) of span.motion
         first, count = span.motion.indptr[row], np.diff(span.motion.indptr)[row]
         term = np.arange(count.max())
         used = term < count[..., np.newaxis]

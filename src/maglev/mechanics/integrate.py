@@ -264,7 +264,8 @@ def _gathered(
     when[status != COMPLETED] = np.nan
     # A lost sample goes on in its row as long as others hold; what it does then means nothing.
     lost_time, is_lost = samples_first("lost_time"), samples_first("lost_magnet") >= 0
-    time = (np.arange(outcomes[0].history.shape[0]) + 1) * (run.record_every * run.time_step)
+    number = np.arange(1.0, outcomes[0].history.shape[0] + 1)
+    time = number * (run.record_every * run.time_step)
     history = np.moveaxis(samples_first("history"), 1, 2).copy()
     for sample in np.flatnonzero(is_lost):
         history[sample, :, time >= lost_time[sample] - 0.5 * run.time_step] = np.nan

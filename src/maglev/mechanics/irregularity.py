@@ -112,7 +112,7 @@ def profile(
     first, last = math.floor(start / dx), math.ceil(end / dx)
     if random:  # the spacing has no end, so an end of the range may fall beside its point
         first, last = first - 1, last + 1
-    x = np.arange(first, last + 1) * dx
+    x = np.arange(first, last + 1, dtype=float) * dx
     if not irregularity.enabled:
         zeros = np.zeros((len(PROFILE_NAMES), x.size))
         return Profile(x0=float(x[0]), dx=dx, values=zeros, slopes=zeros.copy())
@@ -288,7 +288,8 @@ def wavenumbers(irregularity: Irregularity) -> tuple[FloatArray, float]:
     """
     lowest = 1 / irregularity.wavelength_max
     spacing = (1 / irregularity.wavelength_min - lowest) / irregularity.n_harmonics
-    return lowest + (np.arange(irregularity.n_harmonics) + 0.5) * spacing, spacing
+    number = np.arange(irregularity.n_harmonics, dtype=float)
+    return lowest + (number + 0.5) * spacing, spacing
 
 
 def _coarse(irregularity: Irregularity) -> float:
@@ -312,9 +313,9 @@ def _random(
     wavenumber, spacing = wavenumbers(irregularity)
     children = np.random.SeedSequence(seed).spawn(len(PROFILE_NAMES))
     rows = []
-    for spectrum, right, left in (
-        (irregularity.vertical, *children[:2]),
-        (irregularity.lateral, *children[2:]),
+    for spectrum, (right, left) in (
+        (irregularity.vertical, children[:2]),
+        (irregularity.lateral, children[2:]),
     ):
         amplitude = np.sqrt(2 * spectral_density(spectrum, wavenumber) * spacing)
         sides = (right,) if irregularity.sides == "shared" else (right, left)

@@ -154,7 +154,7 @@ def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: Array) -> L
         feed_pole=feed.indices.astype(np.int64),
         feed_weight=feed.data.astype(np.float64),
         arm=group.feed @ rows.arm,
-        senses=group.feed.any(axis=0).astype(np.int64),
+        senses=np.any(group.feed, axis=0).astype(np.int64),
         first=np.array([pair[0] for pair in pairs], dtype=np.int64),
         second=np.array([pair[-1] for pair in pairs], dtype=np.int64),
         decay=late.decay,

@@ -163,7 +163,7 @@ def _blank(of: System, n_steps: int, n_records: int) -> Record:
 
     nothing = np.zeros((train.n_cars, 1))
     return Record(
-        time=(np.arange(n_steps) + 1) * of.step,
+        time=(np.arange(n_steps, dtype=float) + 1) * of.step,
         girder=filled(n_steps, np.zeros((4, 1))),
         body_z=filled(n_steps, nothing),
         body_y=filled(n_steps, nothing),
@@ -339,7 +339,8 @@ def energy_of(record: Record) -> Energy:
     step = record.time[0]
     before = np.concatenate([np.zeros_like(record.power[:1]), record.power[:-1]])
     work = np.cumsum(0.5 * step * (before + record.power), axis=0)
-    return Energy(record.time, *np.moveaxis(work, 1, 0), record.stored)
+    on_train, on_guideway, dissipated = np.moveaxis(work, 1, 0)
+    return Energy(record.time, on_train, on_guideway, dissipated, record.stored)
 
 
 def integrate(

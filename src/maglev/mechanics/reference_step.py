@@ -419,4 +419,4 @@ def held(of: System, magnets: Magnets) -> npt.NDArray[np.bool_]:
     """Which samples (sample,) have every gap between contact and loss."""
     passage = of.config.passage
     between = (magnets.gap > passage.gap_contact) & (magnets.gap < passage.gap_lost)
-    return between.all(axis=0) & np.isfinite(magnets.force).all(axis=0)
+    return np.all(between & np.isfinite(magnets.force), axis=0)

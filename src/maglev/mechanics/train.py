@@ -21,6 +21,7 @@ from maglev.mechanics.car import (
     N_C_FRAMES,
     RIGHT,
     Assembly,
+    Car,
     HungMagnet,
     add_car,
     add_magnet,
@@ -126,9 +127,9 @@ def build(train: Train) -> TrainModel:
     ----------
     docs/theory/train.md.
     """
-    _check_preloads(train)
+    preload = _checked_preload(train)
     assembly = Assembly()
-    cars = []
+    cars: list[Car] = []
     magnets: list[tuple[int, HungMagnet]] = []
     for number in range(train.n_cars):
         car = add_car(
@@ -165,7 +166,7 @@ def build(train: Train) -> TrainModel:
     link_damping = np.array([link.damping for link in assembly.links])
     stiffness = assembled(rows, link_stiffness)
     weight = np.array(assembly.weight)
-    table = _magnet_table(train, magnets, stiffness, weight)
+    table = _magnet_table(train, magnets, stiffness, weight, preload)
     pole_static_force(train, table)  # refuses a magnet whose poles cannot carry its load
     return TrainModel(
         parameters=train,
@@ -195,7 +196,7 @@ def pole_offsets(magnet: Magnet) -> FloatArray:
     offset : (pole,)
         x relative to the magnet's centre [m], falling.
     """
-    return (0.5 * (magnet.n_poles - 1) - np.arange(magnet.n_poles)) * magnet.pole_pitch
+    return (0.5 * (magnet.n_poles - 1) - np.arange(magnet.n_poles, dtype=float)) * magnet.pole_pitch
 
 
 def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
@@ -246,17 +247,20 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
     return force
 
 
-def _check_preloads(train: Train) -> None:
-    if train.guidance_magnet.preload is None or not train.guidance_magnet.preload > 0:
+def _checked_preload(train: Train) -> float:
+    """Force of a guidance magnet at rest [N]; what the suspension magnets carry is not given."""
+    preload = train.guidance_magnet.preload
+    if preload is None or not preload > 0:
         raise ValueError(
             "train.guidance_magnet.preload must be a positive force, such as '10 kN', "
-            f"got {train.guidance_magnet.preload}"
+            f"got {preload}"
         )
     if train.suspension_magnet.preload is not None:
         raise ValueError(
             "train.suspension_magnet.preload must be null, for the magnet carries its share of "
             f"the weight, got {train.suspension_magnet.preload:g} N"
         )
+    return preload
 
 
 def _magnet_table(
@@ -264,6 +268,7 @@ def _magnet_table(
     magnets: list[tuple[int, HungMagnet]],
     stiffness: sp.csr_array,
     weight: FloatArray,
+    preload: float,
 ) -> MagnetTable:
     """Collect the magnets and find what each carries with all of them held still."""
     is_guidance = np.array([magnet.is_guidance for _, magnet in magnets])
@@ -281,14 +286,14 @@ def _magnet_table(
     elastic = stiffness @ sag
     # Poles pull with sum(F) upwards and turn with sum(F dx): weight - K u - sum(F) = 0 on z,
     # - K u + sum(F dx) = 0 on theta.
-    preload = train.guidance_magnet.preload
+    carried = weight[translation] - elastic[translation]
     return MagnetTable(
         is_guidance=is_guidance,
         side=np.array([magnet.side for _, magnet in magnets]),
         x=x,
         translation_dof=translation,
         rotation_dof=rotation,
-        static_force=np.where(is_guidance, preload, weight[translation] - elastic[translation]),
+        static_force=np.where(is_guidance, preload, carried),
         static_moment=np.where(is_guidance, 0.0, elastic[rotation]),
         car=car,
     )

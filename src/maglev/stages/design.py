@@ -32,7 +32,7 @@ from maglev.stages.reads import RUNS_OF_CASE
 from maglev.stages.runs import content, key_of, runs
 from maglev.uncertainty.adaptive import AdaptiveState, absorb, decision, propose
 from maglev.uncertainty.failure_region import border_batch, fit_failure_region
-from maglev.uncertainty.kriging import fit_kriging
+from maglev.uncertainty.kriging import Kriging, fit_kriging
 from maglev.uncertainty.learning import predicted_limits, tail_batch, taylor_batch
 from maglev.uncertainty.pointset import sobol_points
 from maglev.uncertainty.selection import fit_selected
@@ -283,6 +283,7 @@ class _Design:
             return taylor_batch(
                 driving, occupied, candidates, n_new, held_probability=held, scores=scores
             )
+        assert isinstance(surrogate, Kriging)  # `fit` of the method asm
         tail = partial(
             tail_batch,
             surrogate,

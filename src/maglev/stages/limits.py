@@ -212,8 +212,8 @@ def limits_off(
     ]
     return replace(
         plain,
-        lower=np.concatenate([one.lower for one in ends]),
-        upper=np.concatenate([one.upper for one in ends]),
+        lower=np.concatenate([one.interval[0] for one in ends]),
+        upper=np.concatenate([one.interval[1] for one in ends]),
     )
 
 

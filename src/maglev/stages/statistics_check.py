@@ -136,8 +136,7 @@ def _halves(
         codes = zip(status_numbers(a), status_numbers(b), strict=True)
         for k, (level, code) in enumerate(zip(a.failure_probability, codes, strict=True)):
             lower, upper = (a, b) if a.limit[k] <= b.limit[k] else (b, a)
-            facing = (upper.limit[k] - lower.limit[k], lower.upper[k] - lower.limit[k])
-            reach = facing[1] + upper.limit[k] - upper.lower[k]
+            reach = lower.interval[1][k] - lower.limit[k] + upper.limit[k] - upper.interval[0][k]
             value = _ratio(b.limit[k] - a.limit[k], reach)
             checks.append(_judged(kind, case, "mcm", response, level, value, -1.0, 1.0, code))
     return checks
@@ -161,7 +160,7 @@ def _against(
         for response, truth in enumerate(truths):
             codes = zip(status_numbers(truth), status[response], strict=True)
             for k, (level, code) in enumerate(zip(truth.failure_probability, codes, strict=True)):
-                half = 0.5 * (truth.upper[k] - truth.lower[k])
+                half = truth.half_width[k]
                 value = _ratio(limit[response, k] - truth.limit[k], half)
                 checks.append(_judged(kind, case, method, response, level, value, -1.0, 1.0, code))
     low, high = binomial_interval(float(np.count_nonzero(away)), away.size, config.study.confidence)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from maglev.parameters import Config
@@ -51,7 +52,7 @@ def dataset(config: Config, limits: Mapping[str, xr.Dataset]) -> xr.Dataset:
                 f"got {levels} and {others}; compute them again"
             )
     dims = ("method", "response", "failure_probability")
-    variables = {
+    variables: dict[str, tuple[tuple[str, ...], npt.ArrayLike]] = {
         f"table_{name}": (dims, np.stack([limits[one][name].to_numpy() for one in names]))
         for name in _OF_METHOD
     }

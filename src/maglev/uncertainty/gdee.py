@@ -483,7 +483,7 @@ def first_passage(
     n_below = int(np.ceil((face - max(low, histories.min())) / mesh)) + margin
     n_above = int(np.ceil((min(high, histories.max()) - face) / mesh)) + margin
     n_cells = n_below + n_above
-    centre = face + mesh * (np.arange(n_cells) - n_below + 0.5)
+    centre = face + mesh * (np.arange(n_cells, dtype=float) - n_below + 0.5)
     first_kept = n_below if np.isfinite(low) else 0
     past_kept = n_cells
     if np.isfinite(high):
@@ -564,7 +564,7 @@ def _virtual_evolution(
             survival,
             spread[part],
         )
-    centre = start + mesh * (np.arange(n_cells) - n_below)
+    centre = start + mesh * (np.arange(n_cells, dtype=float) - n_below)
     return centre, total, spread, n_steps, farthest * float(np.abs(increment).max())
 
 

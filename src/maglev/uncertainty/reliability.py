@@ -64,6 +64,25 @@ class Limits:
     status: tuple[str, ...]
     confidence: float | None
 
+    @property
+    def interval(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper ends (level,) of the interval.
+
+        Raises
+        ------
+        ValueError
+            If the limits carry no interval.
+        """
+        if self.lower is None or self.upper is None:
+            raise ValueError("the limits carry no interval; find them from independent runs")
+        return self.lower, self.upper
+
+    @property
+    def half_width(self) -> FloatArray:
+        """Half the interval (level,) [unit]."""
+        lower, upper = self.interval
+        return 0.5 * (upper - lower)
+
 
 def exceedance(
     at: npt.ArrayLike,
@@ -507,7 +526,7 @@ def _status(expected: FloatArray, lost: BoolArray) -> tuple[str, ...]:
 def _checked_levels(failure_probability: npt.ArrayLike) -> FloatArray:
     levels = np.atleast_1d(np.asarray(failure_probability, dtype=float))
     if levels.ndim != 1 or not np.all((levels > 0.0) & (levels < 1.0)):
-        raise ValueError(f"failure probabilities must lie in (0, 1), got {failure_probability}")
+        raise ValueError(f"failure probabilities must lie in (0, 1), got {failure_probability!r}")
     return levels
 
 

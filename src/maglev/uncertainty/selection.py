@@ -6,6 +6,7 @@ they make the same surrogate again, without a search.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,11 @@ from maglev.vocabulary import SURROGATES
 CHOICES = (*SURROGATES, "best")
 """What can be asked for: one kind for all responses, or the best of all for each."""
 
-_FITS = {"rbf": fit_rbf, "scaled_rbf": fit_scaled_rbf, "kriging": fit_kriging}
+_FITS: dict[str, Callable[[FloatArray, FloatArray], RBF | ScaledRBF | Kriging]] = {
+    "rbf": fit_rbf,
+    "scaled_rbf": fit_scaled_rbf,
+    "kriging": fit_kriging,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
