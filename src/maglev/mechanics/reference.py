@@ -24,7 +24,6 @@ from tqdm import tqdm
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course
-from maglev.mechanics.course import n_steps as whole_steps
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.reference_magnets import Poles
 from maglev.mechanics.reference_step import State, System, at_rest, held, stepped, system, views
@@ -483,7 +482,7 @@ def solve(
     longest = {"time_step": min(FIRST_STEP, period / FEWEST_IN_A_PERIOD)}
     own = config.model_copy(update={"passage": config.passage.model_copy(update=longest)})
     step = course(own).time_step
-    n_steps = math.ceil(whole_steps(config) * course(config).time_step / step)
+    n_steps = math.ceil(course(config).duration / step)
     every = max(1, int(record_interval / step * (1 + 1e-9))) if record_interval else 0
     coarse = passed(config, profile, gains, step, n_steps, record_every=every, progress=progress)
     kinds = (config.train.suspension_magnet, config.train.guidance_magnet)
