@@ -389,7 +389,7 @@ def integrate(
         profile,
         gains,
         course(config).time_step,
-        whole_steps(config),
+        course(config).n_steps,
         record_every=record_every,
         energy=True,
         progress=progress,
