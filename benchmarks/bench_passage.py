@@ -228,16 +228,16 @@ def noses(system: integrate.System) -> Array:
 
 def rail_under_train(system: integrate.System) -> Array:
     """Share (span,) of a span's rail that a mean step moves: its units under the train [-]."""
-    line, place = system.line, noses(system)
-    unit = line.span_length / line.n_units
+    spans, place = system.spans, noses(system)
+    unit = spans.span_length / spans.n_units
     shares = []
-    for span in range(line.n_spans):
-        tail = place - system.config.train.length - span * line.span_length
-        begin = np.clip(np.floor(tail / unit - 1e-6), 0, line.n_units)
+    for span in range(spans.n_spans):
+        tail = place - system.config.train.length - span * spans.span_length
+        begin = np.clip(np.floor(tail / unit - 1e-6), 0, spans.n_units)
         end = np.clip(
-            np.floor((place - span * line.span_length) / unit + 1e-6) + 1, 0, line.n_units
+            np.floor((place - span * spans.span_length) / unit + 1e-6) + 1, 0, spans.n_units
         )
-        shares.append(np.maximum(end - begin, 0).mean() / line.n_units)
+        shares.append(np.maximum(end - begin, 0).mean() / spans.n_units)
     return np.array(shares)
 
 
@@ -255,14 +255,14 @@ def poles_and_coefficients(system: integrate.System) -> tuple[int, float]:
 
 
 def steps_of_stages(system: integrate.System) -> Array:
-    """Steps that each stage of the guideway lasts (stage,) [-]."""
-    begins = system.line.stages.first_step
+    """Steps that each stretch of the guideway lasts (stretch,) [-]."""
+    begins = system.spans.stretches.first_step
     return np.diff([*begins, course(system.config).n_steps + 1])
 
 
 def operations(system: integrate.System) -> dict[str, float]:
     """Operations of a mean step of one sample in each phase, from the sizes of its arrays."""
-    vehicle, line = system.vehicle, system.line
+    vehicle, spans = system.vehicle, system.spans
     steps = steps_of_stages(system)
     n_dof = vehicle.inverse_mass.size
     # links: what they hang on 3, fused; stretch 2m - 1 and force back 2m for m coefficients
@@ -282,20 +282,26 @@ def operations(system: integrate.System) -> dict[str, float]:
     # them, right and left from mean and roll; back: forces on those coordinates
     rails = 0.0
     for span, share in enumerate(rail_under_train(system)):
-        moved = np.diff(line.upright_start)[span] + 2 * np.diff(line.sideways_start)[span]
-        rails += share * line.stride * (2 * (2 * moved + 2) + 2 + 2 * moved)
+        moved = np.diff(spans.upright_start)[span] + 2 * np.diff(spans.sideways_start)[span]
+        rails += share * spans.stride * (2 * (2 * moved + 2) + 2 + 2 * moved)
     # guideway, of what is stepped: relative motion and its rate, forces back, stiffness, damping,
     # exact step, pier tops
-    guideway, line_states, stages = 0.0, 0.0, line.stages
-    for stage, share in enumerate(steps / course(system.config).n_steps):
-        start, tops, stop = stages.start[stage], stages.tops[stage], stages.start[stage + 1]
-        modes = stages.stepped[start:tops]
-        carried = np.diff(line.carried_start)[modes].sum()
+    guideway, line_states, stretches = 0.0, 0.0, spans.stretches
+    for stretch, share in enumerate(steps / course(system.config).n_steps):
+        start, tops, stop = (
+            stretches.start[stretch],
+            stretches.tops[stretch],
+            stretches.start[stretch + 1],
+        )
+        modes = stretches.stepped[start:tops]
+        carried = np.diff(spans.carried_start)[modes].sum()
         each = slice(start, stop)
-        taken = (stages.taken_to[each] - stages.taken_from[each])[tops - start :].sum()
-        damping = (stages.damping_to[each] - stages.damping_from[each]).sum()
-        between = np.diff(line.stiffness_start)[stages.stepped[tops:stop] - line.square.size].sum()
-        factor = stages.factor_start[stop] - stages.factor_start[tops]
+        taken = (stretches.taken_to[each] - stretches.taken_from[each])[tops - start :].sum()
+        damping = (stretches.damping_to[each] - stretches.damping_from[each]).sum()
+        between = np.diff(spans.stiffness_start)[
+            stretches.stepped[tops:stop] - spans.square.size
+        ].sum()
+        factor = stretches.factor_start[stop] - stretches.factor_start[tops]
         coefficients = carried + taken + modes.size + between + damping + 2 * factor
         guideway += share * (2 * coefficients + (stop - start) + 2 * modes.size + 2 * (stop - tops))
         line_states += share * 8 * (stop - start)
@@ -303,7 +309,7 @@ def operations(system: integrate.System) -> dict[str, float]:
     states = 9 * n_dof * moving + line_states
     # outputs: midspan z and y 4 a column, each section of the low-pass 9, peak of a response 9
     n_sections = packing.run(system.config, 0).sections.shape[0]
-    outputs = 2 * (4 * line.output_column.size + 9 * n_sections)
+    outputs = 2 * (4 * spans.output_column.size + 9 * n_sections)
     outputs += 9 * (4 + 2 * vehicle.body_z.size)
     return {
         "train links": links * moving,
@@ -329,24 +335,24 @@ def _repeat_train(n, vehicle, dt, train):
 
 
 @njit
-def _repeat_answer(n, line, stage, guideway):
+def _repeat_answer(n, spans, stretch, guideway):
     for _ in range(n):
-        _answer(line, stage, guideway)
+        _answer(spans, stretch, guideway)
 
 
 @njit
-def _repeat_advance(n, line, stage, dt, guideway):
+def _repeat_advance(n, spans, stretch, dt, guideway):
     for _ in range(n):
-        _advance_guideway(line.stages, stage, dt, guideway)
+        _advance_guideway(spans.stretches, stretch, dt, guideway)
 
 
 @njit
-def _repeat_rails(n, line, span, guideway, rails, turn, packed):
+def _repeat_rails(n, spans, span, guideway, rails, turn, packed):
     """What the passage does with the rails of one span in a step, there and back."""
     for _ in range(n):
-        _move_span(line, span, 0, line.stride, guideway.position, packed, rails.motion)
-        _move_span(line, span, 0, line.stride, guideway.predicted, packed, rails.rate)
-        _load_span(line, span, 0, line.stride, rails, turn, guideway.force)
+        _move_span(spans, span, 0, spans.stride, guideway.position, packed, rails.motion)
+        _move_span(spans, span, 0, spans.stride, guideway.predicted, packed, rails.rate)
+        _load_span(spans, span, 0, spans.stride, rails, turn, guideway.force)
 
 
 @njit
@@ -368,10 +374,10 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     ``per_step``, the time of a step and sample in a passage [s], is states, outputs and the loop.
     """
     counted = operations(system)
-    line, rng = system.line, np.random.default_rng(3)
+    spans, rng = system.spans, np.random.default_rng(3)
     vehicle, dt = system.vehicle, course(system.config).time_step
     n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
-    n_rail = line.n_spans * line.stride
+    n_rail = spans.n_spans * spans.stride
 
     def rows(n: int, size: float) -> Array:
         """Rows of samples of about a size, where the kernels have theirs."""
@@ -387,7 +393,7 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     scaled, link_pull = zeros(vehicle.scaled_dof.size), zeros(vehicle.link_start.size - 1)
     guideway, guideway_resting = motion(n_line, 1e-5), at_rest(n_line)
     rails = Rails(*(rows(3 * n_rail, 1e-5).reshape((3, n_rail, LANES)) for _ in range(3)))
-    turn, packed = zeros(line.stride), zeros(line.upright.size + line.sideways.size)
+    turn, packed = zeros(spans.stride), zeros(spans.upright.size + spans.sideways.size)
     run = packing.run(system.config, 0)
     kinds = (system.suspension, system.guidance)
     outcome = packing.empty_outcome(system.train, kinds, run)
@@ -404,17 +410,19 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     links = moving * per_call(2000, lambda n: _repeat_links(n, vehicle, train, scaled, link_pull))
     states = moving * per_call(2000, lambda n: _repeat_train(n, vehicle, dt, resting))
     stepped = 0.0
-    for stage, share in enumerate(steps_of_stages(system) / run.n_steps):
-        stepped += share * per_call(500, lambda n, at=stage: _repeat_answer(n, line, at, guideway))
+    for stretch, share in enumerate(steps_of_stages(system) / run.n_steps):
+        stepped += share * per_call(
+            500, lambda n, at=stretch: _repeat_answer(n, spans, at, guideway)
+        )
         states += share * per_call(
-            500, lambda n, at=stage: _repeat_advance(n, line, at, dt, guideway_resting)
+            500, lambda n, at=stretch: _repeat_advance(n, spans, at, dt, guideway_resting)
         )
     shares = rail_under_train(system)
     of_rails = sum(
         share
         * per_call(
             1000,
-            lambda n, span=span: _repeat_rails(n, line, span, guideway, rails, turn, packed),
+            lambda n, span=span: _repeat_rails(n, spans, span, guideway, rails, turn, packed),
         )
         for span, share in enumerate(shares)
     )
@@ -468,11 +476,11 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
 
 def step_bytes(system: integrate.System) -> tuple[int, int]:
     """Bytes that a row of samples goes through in a step: states, and matrices they share."""
-    line, vehicle = system.line, system.vehicle
+    spans, vehicle = system.spans, system.vehicle
     n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
     rows = 5 * n_dof + vehicle.scaled_dof.size + vehicle.link_start.size - 1
-    rows += 5 * n_line + 9 * line.n_spans * line.stride
-    shared = [*line, *line.stages, *vehicle]
+    rows += 5 * n_line + 9 * spans.n_spans * spans.stride
+    shared = [*spans, *spans.stretches, *vehicle]
     tables = sum(array.nbytes for array in shared if isinstance(array, np.ndarray))
     return rows * LANES * 8, tables
 

@@ -35,8 +35,8 @@ def reduced_line():
 
 
 @lru_cache
-def stages():
-    return activity.stages(LINE, reduced_line())
+def stretches():
+    return activity.stretches(LINE, reduced_line())
 
 
 def passed(**constants):
@@ -68,29 +68,29 @@ def test_the_lower_the_modes_that_quiet_spans_keep_the_larger_the_error():
 
 def test_spans_under_the_train_and_beside_it_are_awake_and_so_is_the_middle_one():
     length, n_spans = LINE.guideway.span_length, LINE.guideway.n_spans
-    starts = [stage.first_step for stage in stages()] + [course(LINE).n_steps + 1]
+    starts = [stretch.first_step for stretch in stretches()] + [course(LINE).n_steps + 1]
     assert np.all(np.diff(starts) > 0)
-    for stage, begin, end in zip(stages(), starts, starts[1:], strict=False):
+    for stretch, begin, end in zip(stretches(), starts, starts[1:], strict=False):
         places = course(LINE).nose(np.array([begin, end - 1]) * course(LINE).time_step)
         tail = int(np.floor((places[0] - LINE.train.length) / length))
         head = int(np.floor(places[1] / length))
         reach = range(tail - activity.AWAKE_BESIDE, head + activity.AWAKE_BESIDE + 1)
         for span in {*reach, n_spans // 2} & set(range(n_spans)):
-            assert stage.awake[reduced_line().span_coordinates[span]].all()
-        assert stage.stepped[stage.awake].all()
-        assert stage.stepped[reduced_line().n_modes :].all()  # pier tops pass motion on
+            assert stretch.awake[reduced_line().span_coordinates[span]].all()
+        assert stretch.stepped[stretch.awake].all()
+        assert stretch.stepped[reduced_line().n_modes :].all()  # pier tops pass motion on
 
 
 def test_most_of_a_long_line_is_not_stepped():
-    share = np.mean([stage.stepped.mean() for stage in stages()])
+    share = np.mean([stretch.stepped.mean() for stretch in stretches()])
     assert share < 0.8
-    # Each stage steps as much as the next, whatever the spans beyond: nothing but ends differ.
-    counts = [stage.awake.sum() for stage in stages()[4:-6]]
+    # Each stretch steps as much as the next, whatever the spans beyond: nothing but ends differ.
+    counts = [stretch.awake.sum() for stretch in stretches()[4:-6]]
     assert max(counts) - min(counts) < 0.2 * np.mean(counts)
 
 
 def test_the_guideway_rests_until_the_nose_reaches_it():
-    first = stages()[0].first_step
+    first = stretches()[0].first_step
     assert (
         course(LINE).nose(first * course(LINE).time_step)
         >= 0
@@ -131,13 +131,13 @@ def stepped_periods(step):
     reduced = reduction.reduce(
         guideway.build(config.guideway), passage.mode_cutoff, passage.mode_cutoff_elsewhere
     )
-    line, n = packing.line(reduced, config), reduced.n_coordinates
+    spans, n = packing.spans(reduced, config), reduced.n_coordinates
     operator = np.zeros((n, n))
     for first in range(0, n, LANES):
         motion = _kernels.at_rest(n)
         columns = np.arange(first, min(first + LANES, n))
         motion.position[columns, columns - first] = 1.0
-        _kernels._answer(line, 0, motion)
+        _kernels._answer(spans, 0, motion)
         operator[:, columns] = -motion.force[:, : columns.size]
     squares = np.sort(np.linalg.eigvals(operator).real)
     found = 2 / step * np.arcsin(step / 2 * np.sqrt(squares))
@@ -181,14 +181,16 @@ def test_with_all_modes_kept_quiet_spans_change_no_bit():
 
 def test_coordinates_that_fall_quiet_are_left_at_rest():
     profile = irregularity.profile(LINE.irregularity, track_range(LINE), LINE.seed)
-    stages = integrate.prepare(LINE, profile).line.stages
+    stretches = integrate.prepare(LINE, profile).spans.stretches
     n = reduced_line().n_coordinates
-    ends = np.flatnonzero(np.diff(stages.stilled_start))
+    ends = np.flatnonzero(np.diff(stretches.stilled_start))
     assert ends.size > 3
-    for stage in ends:
+    for stretch in ends:
         arrays = Motion(*(np.ones((n, LANES)) for _ in range(5)))
-        _kernels._still(stages, stage, arrays)
-        stilled = stages.stilled[stages.stilled_start[stage] : stages.stilled_start[stage + 1]]
+        _kernels._still(stretches, stretch, arrays)
+        stilled = stretches.stilled[
+            stretches.stilled_start[stretch] : stretches.stilled_start[stretch + 1]
+        ]
         assert np.all(stilled < reduced_line().n_modes)
         for array in arrays:
             assert not array[stilled].any()

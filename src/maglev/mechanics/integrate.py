@@ -18,11 +18,11 @@ from maglev.mechanics._records import (
     COMPLETED,
     NOT_FINITE,
     STEP_TOO_LARGE,
-    Line,
     MagnetRows,
     Outcome,
     Places,
     Run,
+    Spans,
     Vehicle,
 )
 from maglev.mechanics.course import course, track_range
@@ -56,7 +56,7 @@ class System:
     suspension_places: Places
     guidance_places: Places
     grounds: tuple[packing.Ground, packing.Ground]
-    line: Line
+    spans: Spans
     parts: tuple[Block, ...]
     safe_gains: Array
     config: Config
@@ -110,7 +110,7 @@ def prepare(config: Config, profile: Profile) -> System:
         suspension_places=suspension_places._replace(rail=tracks[0][0], ramp=tracks[0][1]),
         guidance_places=guidance_places._replace(rail=tracks[1][0], ramp=tracks[1][1]),
         grounds=grounds,
-        line=packing.line(reduced, config),
+        spans=packing.spans(reduced, config),
         parts=parts,
         safe_gains=safe_gains(parts, _mean_gains(config), course(config).time_step),
         config=config,
@@ -199,7 +199,7 @@ def integrate(
             guidance_law,
             suspension_places,
             guidance_places,
-            system.line,
+            system.spans,
             run,
             lanes,
             outcome,

@@ -13,15 +13,15 @@ from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics._records import (
     Law,
-    Line,
     MagnetRows,
     Outcome,
     Places,
     Run,
-    Stages,
+    Spans,
+    Stretches,
     Vehicle,
 )
-from maglev.mechanics.activity import Stage, stages, stepped_mass, top_stiffness
+from maglev.mechanics.activity import Stretch, stepped_mass, stretches, top_stiffness
 from maglev.mechanics.control import grouping, late_current
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile, mean_displacement
@@ -274,7 +274,7 @@ def _standing_sag(
     return sag, slope
 
 
-def line(reduced: ReducedGuideway, config: Config) -> Line:
+def spans(reduced: ReducedGuideway, config: Config) -> Spans:
     """Guideway for the kernels."""
     way = course(config)
     columns, n = reduced.span_coordinates, reduced.n_modes
@@ -309,15 +309,15 @@ def line(reduced: ReducedGuideway, config: Config) -> Line:
     )
     carried_start, carried_top, carried = _rows(reduced.carried)
     stiffness_start, stiffness_top, stiffness = _rows(top_stiffness(reduced))
-    of_passage = stages(config, reduced)
-    always = np.logical_and.reduce([stage.stepped for stage in of_passage])
+    of_passage = stretches(config, reduced)
+    always = np.logical_and.reduce([stretch.stepped for stretch in of_passage])
     damping_start, damping_column, damping = _rows(
         _whole_and_short(_stepped_damping(reduced, way.time_step), always)
     )
     taken_start, taken_mode, taken = _rows(
         _whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
     )
-    return Line(
+    return Spans(
         n_spans=reduced.parameters.n_spans,
         span_length=reduced.parameters.span_length,
         stride=_stride(reduced.parameters),
@@ -345,7 +345,7 @@ def line(reduced: ReducedGuideway, config: Config) -> Line:
         damping=damping,
         taken_mode=taken_mode,
         taken=taken,
-        stages=_stages(reduced, config, of_passage, damping_start, taken_start),
+        stretches=_stretches(reduced, config, of_passage, damping_start, taken_start),
     )
 
 
@@ -372,7 +372,7 @@ def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array
 
 
 def _whole_and_short(matrix: sp.csr_array, always: npt.NDArray[np.bool_]) -> sp.csr_array:
-    """The rows of a matrix, then the same without the columns that are not stepped in all stages.
+    """The rows of a matrix, then the same without columns that are not stepped in all stretches.
 
     Short rows are those of quiet spans.
     """
@@ -381,27 +381,29 @@ def _whole_and_short(matrix: sp.csr_array, always: npt.NDArray[np.bool_]) -> sp.
     return both
 
 
-def _stages(
+def _stretches(
     reduced: ReducedGuideway,
     config: Config,
-    of_passage: list[Stage],
+    of_passage: list[Stretch],
     damping_start: IntArray,
     taken_start: IntArray,
-) -> Stages:
-    """What is stepped in each stage, and where its whole or short rows of damping and of what modes
-    take along begin and end."""
+) -> Stretches:
+    """What is stepped in each stretch.
+
+    Also where its rows begin and end, whole or short, of damping and of what modes take along.
+    """
     n = reduced.n_modes
     dt = course(config).time_step
     starts, tops_from, stepped, rows = [0], [], [], []
     factor_rows, factor_start, inverse = [], [0], []
     stilled = []
     before = np.zeros(reduced.n_coordinates, dtype=bool)
-    for stage in of_passage:
-        modes = np.flatnonzero(stage.stepped[:n])
-        tops, factor = stepped_mass(reduced, stage.stepped, dt)
+    for stretch in of_passage:
+        modes = np.flatnonzero(stretch.stepped[:n])
+        tops, factor = stepped_mass(reduced, stretch.stepped, dt)
         coordinates = np.concatenate([modes, tops])
         stepped.append(coordinates)
-        rows.append(coordinates + np.where(stage.awake[coordinates], 0, reduced.n_coordinates))
+        rows.append(coordinates + np.where(stretch.awake[coordinates], 0, reduced.n_coordinates))
         tops_from.append(starts[-1] + modes.size)
         starts.append(starts[-1] + coordinates.size)
         factor_start += [factor_start[-1]] * modes.size
@@ -411,13 +413,13 @@ def _stages(
             met = np.flatnonzero(row[:k])
             factor_rows.append((tops[met], row[met]))
             factor_start.append(factor_start[-1] + met.size)
-        stilled.append(np.flatnonzero(before & ~stage.stepped))
-        before = stage.stepped
+        stilled.append(np.flatnonzero(before & ~stretch.stepped))
+        before = stretch.stepped
     row = np.concatenate(rows)
     top_row = np.maximum(row % reduced.n_coordinates - n, 0)
     top_row += np.where(row >= reduced.n_coordinates, reduced.n_coordinates - n, 0)
-    return Stages(
-        first_step=np.array([stage.first_step for stage in of_passage]),
+    return Stretches(
+        first_step=np.array([stretch.first_step for stretch in of_passage]),
         start=np.array(starts),
         tops=np.array(tops_from),
         stepped=np.concatenate(stepped),

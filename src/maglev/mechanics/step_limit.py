@@ -26,7 +26,7 @@ DAMPING_MARGIN = 1.4
 """Damping ratio of a component mode on its own over that of the guideway's modes, at most [-];
 measured 1.25 with the default parameters."""
 
-LINE_MARGIN = 0.92
+GUIDEWAY_MARGIN = 0.92
 """Stable step of the whole guideway over that of its modes, which damping couples, each on its own
 [-]; measured 0.93 or more."""
 
@@ -64,7 +64,7 @@ def guideway_limit(config: Config, reduced: ReducedGuideway, time_step: float) -
     square = scipy.linalg.eigvalsh(stepped_stiffness(reduced), inertia)[-1]
     fastest = math.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes].max(initial=1e-12))
     return min(
-        LINE_MARGIN * _largest_phase(ratio) / math.sqrt(square),
+        GUIDEWAY_MARGIN * _largest_phase(ratio) / math.sqrt(square),
         _largest_phase(DAMPING_MARGIN * ratio, exact=True) / fastest,
     )
 
