@@ -101,8 +101,8 @@ ROOT = Path(__file__).parents[1]
         (
             "cases: {validation: {coefficient_of_variation: 0.8}}",
             "cases.validation.coefficient_of_variation = 0.8 leaves only 36 % of the gains "
-            "statically stable (k_p > i0/delta0, k_d >= 0), expected at least half; lower it or "
-            "raise the mean gains",
+            "statically stable (k_p > i0/delta0, more for the group half, k_d >= 0), expected at "
+            "least half; lower it, raise the mean gains or take the case away with null",
         ),
         (
             "cases: {New: {}}",

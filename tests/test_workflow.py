@@ -31,6 +31,10 @@ cases:
   cov_010: null
   cov_012: null
   cov_014: {n_spans: 1}
+  group_ends: null
+  group_half: null
+  group_lumped: null
+  lag_2ms: {n_spans: 1, n_samples: 2}
   random_track: {n_spans: 1, methods: [mcm], n_samples: 2, random_track: true}
 """
 

@@ -24,6 +24,7 @@ from maglev.vocabulary import (
     DENSITY_METHODS,
     GAIN_UNITS,
     GAINS,
+    GROUPS,
     LIMIT_STATUS,
     METHODS,
     RESPONSE_UNITS,
@@ -517,6 +518,27 @@ def _study_table() -> dict[str, Variable]:
             "interaction_share",
             _number("response", "1", "share of the variance that gains and track have together"),
         ),
+        # who shares a circuit
+        **{
+            f"{kind}_group": _code("curve", f"who shares a circuit of the {kind}", GROUPS)
+            for kind in ("suspension", "guidance")
+        },
+        **{
+            f"{kind}_{late}": _number("curve", "s", f"{word} of the {kind}")
+            for kind in ("suspension", "guidance")
+            for late, word in (("lag", "lag of the current"), ("delay", "delay of the signal"))
+        },
+        "curve_mean": _number(
+            "curve response", OF_RESPONSE, "mean of the extreme of the runs that held"
+        ),
+        **_with_ends(
+            "curve_deviation",
+            _number(
+                "curve response",
+                OF_RESPONSE,
+                "standard deviation of the extreme of the runs that held",
+            ),
+        ),
         # the line and its tracks
         "track": _number("track", "1", "number of the track", "int32"),
         "seed_of_track": _number("track", "1", "seed of the irregularity of the track", "int64"),
@@ -950,6 +972,19 @@ LAYOUTS: Mapping[str, Layout] = {
             "density_track_only",
             *_ends("gains_share", "track_share", "interaction_share"),
             "n_runs",
+        ),
+    ),
+    "control_study": Layout(
+        title="What the control's circuits do to losses, deviations and limits",
+        variables=(
+            *(
+                f"{kind}_{key}"
+                for kind in ("suspension", "guidance")
+                for key in ("group", "lag", "delay")
+            ),
+            "curve_mean",
+            *_ends("curve_deviation", "curve_limit", "curve_held_limit", "curve_lost_probability"),
+            "curve_n_runs",
         ),
     ),
     "tracks": Layout(

@@ -25,7 +25,7 @@ from pydantic import (
     model_validator,
 )
 
-from maglev.vocabulary import GAIN_KEYS, Gain, Method, Response, Surrogate
+from maglev.vocabulary import GAIN_KEYS, GROUPS, Gain, Group, Method, Response, Surrogate
 
 if TYPE_CHECKING:
     import pint
@@ -848,7 +848,7 @@ class Circuit(Parameters):
     gap of its half.  ``lumped``: one a magnet, fed by the mean gap, which its force goes by too.
     """
 
-    group: Literal["pole", "ends", "half", "lumped"] = Field(
+    group: Group = Field(
         "pole",
         description="who shares a circuit: each pole its own, each half fed at the magnet's end "
         "(ends), each half fed by its mean gap (half), a magnet with one force (lumped)",
@@ -1176,13 +1176,22 @@ class Case(Parameters):
 
 
 def _cases() -> dict[str, Case]:
-    """The cases of the paper."""
+    """The cases of the paper, and those of who shares a circuit and how late its current comes."""
     cases = {"validation": Case(methods=("mcm", "osm", "asm_paper", "asm"))}
     for gain in GAIN_KEYS:
         cases[f"only_{gain}"] = Case(n_spans=20, random_gains=(gain,))
     cases["all_gains"] = Case(n_spans=20)
     for percent in range(4, 16, 2):
         cases[f"cov_{percent:03d}"] = Case(coefficient_of_variation=percent / 100)
+    for name, key, value in (
+        *((f"group_{group}", "group", group) for group in GROUPS if group != "pole"),
+        ("lag_2ms", "lag", "2 ms"),
+    ):
+        cases[name] = Case(
+            set={f"control.{kind}.{key}": value for kind in ("suspension", "guidance")},
+            methods=("mcm", "asm"),
+            n_samples=2000,
+        )
     return cases
 
 
@@ -1199,6 +1208,12 @@ def _with_value(section: Any, keys: list[str], value: Any) -> Any:
         return type(section).model_validate(section.quantities() | {first: value})
     inner = _with_value(getattr(section, first), rest, value)
     return section.model_copy(update={first: inner})
+
+
+BORDER_OF_HALF = {"suspension": 1.246, "guidance": 1.396}
+"""Least stable k_p over i0/delta0 where circuits are fed by the mean gap of their half: of one
+linearised car with the default masses and springs (docs/theory/control.md); of the other groups it
+is 1.  Another train has others, so that they serve for a first check only."""
 
 
 def _normal_cdf(u: float) -> float:
@@ -1329,8 +1344,9 @@ class Config(Parameters):
     def statically_stable(self, case: Case) -> float:
         """Probability that the gains of a case can hold the train statically [-].
 
-        A magnet pulls more the closer it is, so its k_p must exceed i₀/δ₀ and its k_d must not be
-        negative.
+        A magnet pulls more the closer it is, so its k_p must exceed i₀/δ₀, times `BORDER_OF_HALF`
+        for the group ``half``, and its k_d must not be negative.  What lag and delay take away is
+        not in it.
 
         References
         ----------
@@ -1339,8 +1355,10 @@ class Config(Parameters):
         probability = 1.0
         for kind in ("suspension", "guidance"):
             magnet = getattr(self.train, f"{kind}_magnet")
+            half = getattr(self.control, kind).group == "half"
+            factor = BORDER_OF_HALF[kind] if half else 1.0
             for gain, least in (
-                (f"{kind}_proportional", magnet.current_reference / magnet.gap_reference),
+                (f"{kind}_proportional", factor * magnet.current_reference / magnet.gap_reference),
                 (f"{kind}_derivative", 0.0),
             ):
                 mean = getattr(self.gains, gain)
@@ -1374,8 +1392,8 @@ class Config(Parameters):
             raise ValueError(
                 f"cases.{name}.coefficient_of_variation = {case.coefficient_of_variation:g} "
                 f"leaves only {100 * stable:.0f} % of the gains statically stable "
-                "(k_p > i0/delta0, k_d >= 0), expected at least half; lower it or raise the "
-                "mean gains"
+                "(k_p > i0/delta0, more for the group half, k_d >= 0), expected at least half; "
+                "lower it, raise the mean gains or take the case away with null"
             )
 
     @model_validator(mode="after")

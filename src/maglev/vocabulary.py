@@ -86,6 +86,12 @@ STATUS = {0: "completed", 1: "contact", 2: "gap_lost", 3: "not_finite", 4: "step
 STEP_TOO_LARGE = 4
 """Status of a passage that was not judged: its gains need a smaller step."""
 
+Group = Literal["pole", "ends", "half", "lumped"]
+"""Who shares a circuit of the control."""
+
+GROUPS: tuple[Group, ...] = get_args(Group)
+"""The groups in the order in which they are shown."""
+
 TRAIN_PARTS = (
     "car_body_lateral",
     "car_body_vertical",

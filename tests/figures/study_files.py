@@ -248,12 +248,22 @@ def line(n=5):
     return _filled("line", sizes, **given).assign_attrs(track=f"{n} tracks")
 
 
-def write(folder, layout, dataset, *, case, method=None, variation=0.1, demonstration=False):
+def circuits(group="pole", lag="0 s"):
+    """Both kinds of magnet with such circuits, as a configuration is written."""
+    return {
+        kind: {"group": group, "lag": lag, "delay": "0 s"} for kind in ("suspension", "guidance")
+    }
+
+
+def write(
+    folder, layout, dataset, *, case, method=None, variation=0.1, demonstration=False, control=None
+):
     """Write a file as its stage would and return its name."""
     path = folder / f"{layout}_{case}_{method}.nc"
     config = {
         "demonstration": demonstration,
         "study": {"confidence": 0.95},
+        "control": control or circuits(),
         "cases": {case: {"coefficient_of_variation": variation, "n_spans": 5}},
     }
     attributes = {"case": case} | ({} if method is None else {"method": method})
@@ -264,10 +274,10 @@ def write(folder, layout, dataset, *, case, method=None, variation=0.1, demonstr
 def study(folder, demonstration=False):
     """Files of every figure of the study, by its name."""
 
-    def one(layout, dataset, case="validation", method=None, variation=0.1):
+    def one(layout, dataset, case="validation", method=None, variation=0.1, control=None):
         return write(
             folder, layout, dataset, case=case, method=method, variation=variation,
-            demonstration=demonstration,
+            demonstration=demonstration, control=control,
         )  # fmt: skip
 
     by_method = [
@@ -292,6 +302,19 @@ def study(folder, demonstration=False):
         )
         for k, (v, lost) in enumerate(((0.14, 0.02), (0.04, 0.0), (0.1, 0.003)))
     ]
+    of_control = [
+        (
+            one("density", density(shift=shift, lost=lost), case, "asm", 0.1),
+            one("limits", limits(lost=lost), case, "asm", 0.1),
+            one("design", design(), case, "asm", 0.1, control),
+        )
+        for case, shift, lost, control in (
+            ("validation_too", 0.0, 0.002, circuits()),
+            ("group_half", 1.0, 0.14, circuits("half")),
+            ("lag_2ms", 0.5, 0.003, circuits(lag="0.002 s")),
+        )
+    ]
+    by_control = list(zip(*of_control, strict=True))
     accurate = one("accuracy", accuracy())
     baseline = one("runs", runs(), method="mcm")
     designs = [
@@ -307,6 +330,8 @@ def study(folder, demonstration=False):
         "limits_by_gain": [*by_gain[1], *by_gain[2]],
         "density_by_variation": [*by_variation[0], *by_variation[2]],
         "limits_by_variation": [*by_variation[1], *by_variation[2]],
+        "density_by_control": [*by_control[0], *by_control[2]],
+        "limits_by_control": [*by_control[1], *by_control[2]],
         "sobol": [one("surrogate", surrogate(), method="asm")],
         "stability": [one("stability", stability()), baseline],
         "accuracy": [accurate],

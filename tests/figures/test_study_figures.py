@@ -1,5 +1,7 @@
 """Figures of the study draw from small files, show what those hold, and refuse what is missing."""
 
+import json
+
 import numpy as np
 import pytest
 import study_files
@@ -9,7 +11,7 @@ from numpy.testing import assert_allclose
 from test_figures import VALIDATION
 
 from maglev import datasets
-from maglev.figures import FIGURES, curves, draw, labels, layouts_of
+from maglev.figures import FIGURES, curves, draw, labels, layouts_of, style
 
 
 @pytest.fixture(scope="module")
@@ -113,3 +115,25 @@ def test_a_range_holds_the_body_and_leaves_out_the_tail(files):
 def test_shares_are_written_with_two_digits():
     assert [labels.percent(one) for one in (0.0, 0.0031, 0.25)] == ["0 %", "0.31 %", "25 %"]
     assert labels.percent(1e-7) == "< 0.001 %"
+
+
+def test_circuits_are_told_apart_by_their_words():
+    def words(suspension, guidance=None):
+        control = study_files.circuits(**suspension)
+        control["guidance"] = study_files.circuits(
+            **(suspension if guidance is None else guidance)
+        )["guidance"]
+        text = json.dumps({"control": control})
+        return labels.control_style(xr.Dataset(attrs={"config": text}))[0]
+
+    assert words({}) == "a circuit a pole"
+    assert words({"lag": "0.002 s"}) == "a circuit a pole, 2 ms of lag"
+    assert words({"group": "half"}, {}) == "suspension half; guidance pole"
+    with pytest.raises(ValueError, match="must say how its circuits"):
+        labels.control_style(xr.Dataset())
+
+
+def test_a_figure_says_of_which_track_its_numbers_are(tmp_path, files):
+    figure = Figure()
+    style.say_track(figure, "track of seed 7")
+    assert figure.get_suptitle() == "track of seed 7"

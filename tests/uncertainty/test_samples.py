@@ -6,7 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from maglev.uncertainty.samples import effective_size, held_part, weighted_sample
+from maglev.uncertainty.samples import (
+    deviation_interval,
+    effective_size,
+    held_part,
+    weighted_sample,
+)
 
 
 def test_held_part_of_a_hand_worked_case():
@@ -48,3 +53,13 @@ def test_faulty_samples_are_refused():
     ):
         with pytest.raises(ValueError, match=sentence):
             call()
+
+
+@pytest.mark.parametrize("draw", ["standard_normal", "standard_exponential"])
+def test_the_interval_of_a_deviation_holds_it_as_often_as_it_says(draw):
+    rng = np.random.default_rng(5)
+    found = [deviation_interval(getattr(rng, draw)(300), 0.9) for _ in range(300)]
+    inside = [low <= 1.0 <= high for _, low, high in found]  # both have a deviation of 1
+    assert 0.84 < np.mean(inside) < 0.96
+    with pytest.raises(ValueError, match="at least 8 values, got 3"):
+        deviation_interval([1.0, 2.0, 3.0])

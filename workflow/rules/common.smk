@@ -22,6 +22,16 @@ def checked_cases(every: bool) -> list[str]:
     ]
 
 
+# cases of who shares a circuit and how late its current comes, beside the case of the tables
+CONTROL_CASES = [
+    case
+    for case in parameters.cases
+    if case.startswith(("group_", "lag_", "delay_")) and methods_of(case, DESIGNED)
+]
+if CONTROL_CASES and methods_of(TABLE_CASE, DESIGNED):
+    CONTROL_CASES.insert(0, TABLE_CASE)
+
+
 def place(stage: str, **names: str) -> str:
     """Where a file of a stage lies, for such names of its wildcards."""
     return f"<results>/{FILES[stage]}".format(**names)
@@ -52,9 +62,19 @@ def chunks(case: str) -> list[dict[str, str]]:
     ]
 
 
-def names_of(role: str, by: tuple[str, ...], wildcards) -> list[dict[str, str]]:
+def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str, str]]:
     """Names of the files of a role that has many."""
     case, every = case_of(wildcards), wildcards.get("scope") == "statistics_truth"
+    if stage.name == "control_study":
+        return [
+            {"case": one, "method": method} if "method" in by else {"case": one}
+            for one in CONTROL_CASES
+            for method in (
+                [*methods_of(one, (BASELINE,)), *methods_of(one, DESIGNED)[-1:]]
+                if "method" in by
+                else methods_of(one, (BASELINE,))
+            )
+        ]
     return {
         ("method",): lambda: [
             {"method": method} for method in methods_of(case, STAGES[role].methods)
@@ -76,7 +96,7 @@ def places_of(stage, wildcards) -> dict[str, list[tuple[dict[str, str], str]]]:
     own = {"case": case_of(wildcards), "method": wildcards.get("method")}
     for role, one in stage.roles(own["method"]).items():
         if one.by:
-            names = names_of(role, one.by, wildcards)
+            names = names_of(stage, role, one.by, wildcards)
         elif one.optional and not methods_of(own["case"], STAGES[role].methods):
             continue
         else:

@@ -68,6 +68,16 @@ DRAWN = {
         "limits for gains that vary ever more",
         of_last_method(VARIATION_CASES, "limits", "design"),
     ),
+    "fig_control_density": (
+        "density_by_control",
+        "densities for each sharing of circuits, and with lag",
+        of_last_method(CONTROL_CASES, "density", "design"),
+    ),
+    "fig_control_limits": (
+        "limits_by_control",
+        "limits for each sharing of circuits, and with lag",
+        of_last_method(CONTROL_CASES, "limits", "design"),
+    ),
     "fig_sobol": (
         "sobol",
         "which gain matters for which response",

@@ -26,6 +26,7 @@ FILES = {
     "prediction": "{case}/prediction.nc",
     "tracks": "track/tracks.nc",
     "line": "tables/line.nc",
+    "control_study": "tables/control_study.nc",
     "table1": "tables/table1.nc",
     "paper_and_ours": "tables/paper_and_ours.nc",
     "statistics_check": "checks/{scope}.nc",

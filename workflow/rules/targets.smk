@@ -71,6 +71,8 @@ def results() -> list[str]:
     )
     for name, stage in STAGES.items():
         wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
+        if name == "control_study" and not CONTROL_CASES:
+            continue
         if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
             files.append(place(name))
         if wildcards == {"case"}:

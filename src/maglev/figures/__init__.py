@@ -20,6 +20,8 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "limits_by_gain": ("limits*", "design*"),
     "density_by_variation": ("density*", "design*"),
     "limits_by_variation": ("limits*", "design*"),
+    "density_by_control": ("density*", "design*"),
+    "limits_by_control": ("limits*", "design*"),
     "sobol": ("surrogate",),
     "stability": ("stability", "runs"),
     "accuracy": ("accuracy",),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
 from typing import SupportsFloat, SupportsInt
 
@@ -150,6 +151,53 @@ def case_style(parameters: list[int]) -> tuple[str, style.Look]:
     if len(parameters) == len(GAINS):
         return "all four gains", {"color": "#000000", "ls": "-"}
     return " and ".join(GAIN[number] for number in parameters), {"color": "#999999", "ls": "-"}
+
+
+_GROUP = {
+    "pole": "a circuit a pole",
+    "ends": "two a magnet, fed at its ends",
+    "half": "two a magnet, fed by the half's mean gap",
+    "lumped": "one a magnet, one force",
+}
+_GROUP_COLOUR = {"pole": "#000000", "ends": "#0072B2", "half": "#D55E00", "lumped": "#009E73"}
+_LATE_COLOUR = {"pole": "#CC79A7", "ends": "#56B4E9", "half": "#E69F00", "lumped": "#F0E442"}
+_GROUP_DASHES = {"pole": "-", "ends": "--", "half": "-.", "lumped": ":"}
+
+
+def control_style(design: xr.Dataset) -> tuple[str, dict[str, object]]:
+    """Words and line for a case by who shares a circuit, and how late its current comes.
+
+    Raises
+    ------
+    ValueError
+        If the file does not say how it was configured.
+    """
+    try:
+        control = json.loads(design.attrs["config"])["control"]
+        kinds = [control[kind] for kind in ("suspension", "guidance")]
+        groups = [str(one["group"]) for one in kinds]
+        times = [
+            [f"{one[key]} of {key}" for key in ("lag", "delay") if float(one[key].split()[0])]
+            for one in kinds
+        ]
+    except (KeyError, TypeError):
+        raise ValueError("the file must say how its circuits were configured") from None
+    late = [_in_ms(", ".join(one)) for one in times]
+    if groups[0] == groups[1] and late[0] == late[1]:
+        words = ", ".join(filter(None, (_GROUP[groups[0]], late[0])))
+    else:
+        words = "; ".join(
+            ", ".join(filter(None, (f"{kind} {group}", one)))
+            for kind, group, one in zip(("suspension", "guidance"), groups, late, strict=True)
+        )
+    if any(late):
+        return words, {"color": _LATE_COLOUR[groups[0]], "ls": (0, (5, 1))}
+    return words, {"color": _GROUP_COLOUR[groups[0]], "ls": _GROUP_DASHES[groups[0]]}
+
+
+def _in_ms(words: str) -> str:
+    """Times in words as milliseconds."""
+    return re.sub(r"([0-9.e+-]+) s\b", lambda found: f"{1e3 * float(found[1]):g} ms", words)
 
 
 def response_panels(height: float) -> tuple[Figure, list[tuple[int, Axes, Shown]]]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 from maglev.arrays import FloatArray
 
@@ -33,6 +34,52 @@ class HeldPart:
     probability: FloatArray
     lost_probability: float
     n_lost: int
+
+
+def deviation_interval(
+    values: npt.ArrayLike, confidence: float = 0.95
+) -> tuple[float, float, float]:
+    """Standard deviation of independent values that need not be normal, with its interval.
+
+    The interval of the logarithm, with the kurtosis about a trimmed mean.
+
+    Parameters
+    ----------
+    values : (sample,)
+        Values [their unit].
+    confidence
+        Two-sided confidence [-].
+
+    Returns
+    -------
+    deviation, lower, upper
+        [unit].
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than eight values, or one is not finite.
+
+    References
+    ----------
+    Bonett, Comput. Stat. Data Anal. 50 (2006) 775-782.
+    """
+    values, _ = weighted_sample(values)
+    n = values.size
+    if n < 8:
+        raise ValueError(f"the interval of a deviation needs at least 8 values, got {n}")
+    scale = values.std()
+    if scale == 0.0:
+        return 0.0, 0.0, 0.0
+    u = (values - values.mean()) / scale
+    middle = stats.trim_mean(u, 0.5 / np.sqrt(n - 4.0))
+    kurtosis = n * np.sum((u - middle) ** 4) / np.sum(u**2) ** 2
+    z = stats.norm.ppf(0.5 + 0.5 * confidence)
+    c = n / (n - z)
+    half = z * c * np.sqrt((kurtosis - (n - 3) / n) / (n - 1))
+    deviation = values.std(ddof=1)
+    ends = deviation * np.sqrt(c * np.exp([-half, half]))
+    return float(deviation), float(ends[0]), float(ends[1])
 
 
 def weighted_sample(

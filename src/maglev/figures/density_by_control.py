@@ -1,0 +1,48 @@
+"""Densities of the six extremes for each sharing of circuits, and with lag."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from maglev.figures import curves, labels, style
+
+
+def figure(
+    densities: Sequence[xr.Dataset], designs: Sequence[xr.Dataset]
+) -> tuple[Figure, xr.Dataset]:
+    """Draw the densities, a curve per case.
+
+    Parameters
+    ----------
+    densities
+        Layout ``density``, one per case.
+    designs
+        Layout ``design`` (or ``runs`` of a baseline), of the same cases in the same order.
+
+    Returns
+    -------
+    figure, plotted
+        The figure and the numbers in it.
+    """
+    found = curves.densities(densities)
+    looks, words = [], []
+    for one, design in zip(densities, designs, strict=True):
+        name, look = labels.control_style(design)
+        looks.append(look)
+        words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
+    fig, panels = labels.response_panels(4.7)
+    for response, axis, shown in panels:
+        curves.draw_densities(axis, found, response, looks)
+        low, high = curves.body(found, response, 5e-3)
+        axis.set_xlim(shown.scale * low, shown.scale * high)
+    style.below(
+        fig,
+        panels[0][1].get_lines(),
+        words,
+        columns=2,
+        title=f"gains {labels.of_settings(designs[0])}",
+    )
+    return fig, found
