@@ -24,7 +24,6 @@ from tqdm import tqdm
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course
-from maglev.mechanics.course import n_steps as whole_steps
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.reference_magnets import Poles
 from maglev.mechanics.reference_step import State, System, at_rest, held, stepped, system, views
@@ -379,12 +378,13 @@ def integrate(
     Newmark, J. Eng. Mech. Div. ASCE 85(EM3):67-94 (1959).
     """
     gains = checked_gains(gains, config.gains.further)
+    way = course(config)
     record = passed(
         config,
         profile,
         gains,
-        course(config).time_step,
-        whole_steps(config),
+        way.time_step,
+        way.n_steps,
         record_every=record_every,
         energy=True,
         progress=progress,
@@ -474,7 +474,7 @@ def solve(
     began, gains = perf_counter(), checked_gains(gains, config.gains.further)
     own = config.passage.model_copy(update={"time_step": FIRST_STEP})
     step = course(config.model_copy(update={"passage": own})).time_step
-    n_steps = math.ceil(whole_steps(config) * course(config).time_step / step)
+    n_steps = math.ceil(course(config).duration / step)
     every = max(1, int(record_interval / step * (1 + 1e-9))) if record_interval else 0
     coarse = passed(config, profile, gains, step, n_steps, record_every=every, progress=progress)
     before = None

@@ -144,22 +144,22 @@ def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
     Searle, Casella, McCulloch, Variance Components (1992), sec. 4.3; Arvesen, Schmitz, Biometrics
     26 (1970) 677-686, for the jackknife; docs/theory/reliability.md, eqs. (14) and (15).
     """
-    values = np.asarray(values, dtype=float)
-    if values.ndim != 2 or values.shape[0] < 3 or values.shape[1] < 2:
+    runs = np.asarray(values, dtype=float)
+    if runs.ndim != 2 or runs.shape[0] < 3 or runs.shape[1] < 2:
         raise ValueError(
-            f"crossed runs have shape {values.shape}, expected (second, first) with at least three "
+            f"crossed runs have shape {runs.shape}, expected (second, first) with at least three "
             "second and two first inputs"
         )
-    if not np.isfinite(values).all():
+    if not np.isfinite(runs).all():
         raise ValueError("crossed runs must be finite; leave inputs with a lost run out")
-    if np.ptp(values) == 0.0:
-        raise ValueError(f"crossed runs must differ, got {values[0, 0]} everywhere")
+    if np.ptp(runs) == 0.0:
+        raise ValueError(f"crossed runs must differ, got {runs[0, 0]} everywhere")
     if not 0.0 < confidence < 1.0:
         raise ValueError(f"confidence must lie in (0, 1), got {confidence}")
-    values = (values - values.mean()) / values.std()  # no cancellation
-    whole = _component_shares(values)
+    runs = (runs - runs.mean()) / runs.std()  # no cancellation
+    whole = _component_shares(runs)
     left_out = [
-        np.array([_component_shares(np.delete(values, k, axis)) for k in range(values.shape[axis])])
+        np.array([_component_shares(np.delete(runs, k, axis)) for k in range(runs.shape[axis])])
         for axis in (0, 1)
     ]
     inside = np.logical_and.reduce(
@@ -170,7 +170,7 @@ def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
     for without in left_out:
         each, n = _logit_where(inside, without), without.shape[0]
         variance += (n - 1) / n * np.square(each - each.mean(axis=0)).sum(axis=0)
-    half = stats.t.ppf(0.5 + 0.5 * confidence, values.shape[0] - 1) * np.sqrt(variance)
+    half = stats.t.ppf(0.5 + 0.5 * confidence, runs.shape[0] - 1) * np.sqrt(variance)
     ends = [np.where(inside, special.expit(one), one) for one in (at - half, at + half)]
     found = np.array([whole, *ends])
     return Shares(first=found[:, 0], second=found[:, 1], interaction=found[:, 2])
