@@ -2,6 +2,7 @@
 
 The command of a stage follows from its declaration.  A user's mistake ends with one sentence on
 standard error and exit code 2 (the command line or the configuration) or 1 (anything found later).
+Any other exception is a fault of the program and shows its traceback.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from maglev.errors import ConfigError, UserError
 from maglev.figures import FIGURES
 
 if TYPE_CHECKING:
@@ -55,14 +57,18 @@ class _Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
-        except (ValueError, FileNotFoundError) as error:
+        except (UserError, FileNotFoundError, PermissionError) as error:
             if ctx.params["traceback"]:
                 raise
-            from maglev.config import ConfigError
-
-            sentence = " ".join(str(error).split())
             failure = _BadConfiguration if isinstance(error, ConfigError) else click.ClickException
-            raise failure(sentence) from error
+            raise failure(_sentence(error)) from error
+
+
+def _sentence(error: UserError | OSError) -> str:
+    """Our own words in one line, or a file's name with what the system says of it."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
+    return " ".join(str(error).split())
 
 
 @click.group(cls=_Commands)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from maglev import datasets, profiles
+from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
@@ -69,7 +70,7 @@ def simulate(
 
     Raises
     ------
-    ValueError
+    UserError
         If the gains have another shape or are not finite, the time step exceeds the stability
         limit, the irregularity is shorter than the run, the solver is unknown, or the seeds are
         not whole numbers from zero, one for each sample of the production solver.
@@ -84,7 +85,7 @@ def simulate(
     """
     gains = checked_gains(gains, config.gains.further)
     if solver not in ("production", "reference"):
-        raise ValueError(f"solver must be 'production' or 'reference', got {solver!r}")
+        raise UserError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
     every = (
         max(1, int(HISTORY_INTERVAL / course(config).time_step * (1 + 1e-9))) if histories else 0
@@ -124,7 +125,7 @@ def track(config: Config, seed: int | None = None) -> Profile:
 
     Raises
     ------
-    ValueError, FileNotFoundError
+    UserError, FileNotFoundError
         If a measured profile cannot be read or is shorter than the run.
     """
     irregularity = config.irregularity
@@ -156,12 +157,12 @@ def track_words(config: Config, seeds: Sequence[int] | None = None) -> str:
 def _checked_seeds(track_seeds: npt.ArrayLike, n_samples: int, solver: str) -> list[int]:
     seeds = np.asarray(track_seeds)
     if seeds.shape != (n_samples,) or seeds.dtype.kind not in "iu" or (seeds < 0).any():
-        raise ValueError(
+        raise UserError(
             f"track_seeds must be {n_samples} whole numbers from zero, one for each sample, "
             f"got {seeds.dtype} of shape {seeds.shape}"
         )
     if solver != "production":
-        raise ValueError(
+        raise UserError(
             "the reference solver takes one track for all samples; leave track_seeds out, "
             "or take the production solver"
         )

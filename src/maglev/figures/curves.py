@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 
 from maglev.arrays import FloatArray
 from maglev.datasets import VARIABLES
+from maglev.errors import UserError
 from maglev.figures import labels
 from maglev.figures.style import Look
 from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
@@ -58,14 +59,14 @@ def limits(data: Sequence[xr.Dataset]) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If their failure probabilities differ.
     """
     levels = data[0]["failure_probability"].to_numpy()
     columns: dict[str, list[FloatArray]] = {}
     for one in data:
         if not np.array_equal(one["failure_probability"].to_numpy(), levels):
-            raise ValueError("all limits must be at the same failure probabilities")
+            raise UserError("all limits must be at the same failure probabilities")
         for name in ("limit", "held_limit"):
             given = one[f"{name}_status"].to_numpy() == _GIVEN
             infinite = one[f"{name}_status"].to_numpy() == _INFINITE

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from maglev.errors import UserError
 from maglev.figures import curves, labels, style
 from maglev.vocabulary import RESPONSES
 
@@ -29,12 +30,12 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no baseline among them.
     """
     methods = [labels.method_of(one) for one in densities]
     if "mcm" not in methods:
-        raise ValueError("figure density_by_method: there is no baseline among the densities")
+        raise UserError("figure density_by_method: there is no baseline among the densities")
     found = curves.densities(densities)
     truth = methods.index("mcm")
     peak = found["curve_peak"]

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.typing import LineStyleType
 
+from maglev.errors import UserError
 from maglev.figures import style
 from maglev.vocabulary import GAINS, METHODS, RESPONSES
 
@@ -95,12 +96,12 @@ def method_of(data: xr.Dataset) -> str:
 
     Raises
     ------
-    ValueError
+    UserError
         If the file does not say it.
     """
     name = data.attrs.get("method", "")
     if name not in METHODS:
-        raise ValueError(f"the file must say its method, one of {', '.join(METHODS)}, got '{name}'")
+        raise UserError(f"the file must say its method, one of {', '.join(METHODS)}, got '{name}'")
     return str(name)
 
 
@@ -114,14 +115,14 @@ def settings(design: xr.Dataset) -> tuple[float, int]:
 
     Raises
     ------
-    ValueError
+    UserError
         If the file does not say them.
     """
     try:
         of_case = json.loads(design.attrs["config"])["cases"][design.attrs["case"]]
         return float(of_case["coefficient_of_variation"]), int(of_case["n_spans"])
     except (KeyError, TypeError):
-        raise ValueError("the file must say its case and how it was configured") from None
+        raise UserError("the file must say its case and how it was configured") from None
 
 
 def confidence(data: xr.Dataset) -> str:
@@ -129,13 +130,13 @@ def confidence(data: xr.Dataset) -> str:
 
     Raises
     ------
-    ValueError
+    UserError
         If the file does not say it.
     """
     try:
         return f"{100 * json.loads(data.attrs['config'])['study']['confidence']:g} %"
     except (KeyError, TypeError):
-        raise ValueError("the file must say the confidence of its intervals") from None
+        raise UserError("the file must say the confidence of its intervals") from None
 
 
 def gains_of(data: xr.Dataset) -> list[int]:

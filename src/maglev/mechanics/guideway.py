@@ -17,6 +17,7 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
+from maglev.errors import UserError
 from maglev.mechanics import timoshenko
 from maglev.mechanics.timoshenko import PITCH, ROLL, YAW, FloatArray, X, Y, Z
 from maglev.parameters import BeamSection, Guideway, Pier
@@ -135,11 +136,11 @@ class GuidewayModel:
 
         Raises
         ------
-        ValueError
+        UserError
             If ``side`` is neither.
         """
         if side not in (RIGHT, LEFT):
-            raise ValueError(f"side must be {RIGHT} (right) or {LEFT} (left), got {side}")
+            raise UserError(f"side must be {RIGHT} (right) or {LEFT} (left), got {side}")
         return _line_rows(self.rail_lines[0 if side == RIGHT else 1], x, self.n_dof)
 
     def rail_section_rows(
@@ -323,7 +324,7 @@ def modes(model: GuidewayModel, cutoff_hz: float) -> tuple[FloatArray, FloatArra
 
     Raises
     ------
-    ValueError
+    UserError
         If the cut-off is not positive or the model has no modes above it.
     RuntimeError
         If the iteration missed a mode.
@@ -333,13 +334,13 @@ def modes(model: GuidewayModel, cutoff_hz: float) -> tuple[FloatArray, FloatArra
     Parlett, The Symmetric Eigenvalue Problem (1998), ch. 3 and 13.
     """
     if not cutoff_hz > 0:
-        raise ValueError(f"cutoff_hz must be positive, got {cutoff_hz} Hz")
+        raise UserError(f"cutoff_hz must be positive, got {cutoff_hz} Hz")
     K, M = model.stiffness.tocsc(), model.mass.tocsc()
     squared = (2 * math.pi * cutoff_hz) ** 2
     pivots = _factors(K - squared * M).U.diagonal()
     n_modes = int(np.count_nonzero(pivots < 0))
     if n_modes >= model.n_dof - 1:
-        raise ValueError(
+        raise UserError(
             f"cutoff_hz must lie below the model's highest mode, got {cutoff_hz} Hz; "
             "refine the model"
         )
@@ -382,7 +383,7 @@ def damping(model: GuidewayModel, ratio: float, cutoff_hz: float) -> ModalDampin
 
     Raises
     ------
-    ValueError
+    UserError
         If ``ratio`` is not in [0, 1), or for a cut-off that `modes` refuses.
 
     References
@@ -390,7 +391,7 @@ def damping(model: GuidewayModel, ratio: float, cutoff_hz: float) -> ModalDampin
     Wilson and Penzien, Int. J. Numer. Methods Eng. 4 (1972) 5-10.
     """
     if not 0 <= ratio < 1:
-        raise ValueError(f"damping ratio must lie in [0, 1), got {ratio}")
+        raise UserError(f"damping ratio must lie in [0, 1), got {ratio}")
     frequency, shape = modes(model, cutoff_hz)
     return ModalDamping(
         rate=2 * ratio * 2 * math.pi * cutoff_hz,
@@ -554,7 +555,7 @@ def rectangle_torsion_constant(width: float, depth: float) -> float:
 
     Raises
     ------
-    ValueError
+    UserError
         If a side is not positive.
 
     References
@@ -562,7 +563,7 @@ def rectangle_torsion_constant(width: float, depth: float) -> float:
     Timoshenko and Goodier, Theory of Elasticity (1970), sec. 109.
     """
     if not (width > 0 and depth > 0):
-        raise ValueError(f"sides must be positive, got {width} m and {depth} m")
+        raise UserError(f"sides must be positive, got {width} m and {depth} m")
     a, b = max(width, depth), min(width, depth)
     n = np.arange(1, 2 * _TORSION_TERMS, 2)
     series = np.sum(np.tanh(n * math.pi * a / (2 * b)) / n**5.0)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import packing
 from maglev.mechanics import train as train_model
@@ -83,7 +84,7 @@ def prepare(config: Config, profile: Profile) -> System:
 
     Raises
     ------
-    ValueError
+    UserError
         If the time step exceeds the stability limit or the profile is shorter than the run.
     """
     train = train_model.build(config.train)
@@ -156,7 +157,7 @@ def integrate(
 
     Raises
     ------
-    ValueError
+    UserError
         If the gains have the wrong shape or are not finite.
     """
     config = system.config
@@ -221,7 +222,7 @@ def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ..
     if not step_holds(parts, gains, dt):
         limit = min(limit, train_limit(parts, gains))
     if not dt < limit:
-        raise ValueError(
+        raise UserError(
             f"passage.time_step must be below the stability limit of {limit * 1e3:.3g} ms, "
             f"got {dt * 1e3:.3g} ms; take a smaller step or lower passage.mode_cutoff"
         )
@@ -236,7 +237,7 @@ def _check_reach(config: Config, profile: Profile) -> None:
     start, stop = track_range(config)
     grid_stop = profile.x0 + profile.dx * (profile.values.shape[1] - 1)
     if profile.x0 > start or grid_stop < stop:
-        raise ValueError(
+        raise UserError(
             f"the irregularity must reach from {start:.1f} m to {stop:.1f} m, "
             f"got {profile.x0:.1f} m to {grid_stop:.1f} m"
         )

@@ -22,6 +22,7 @@ from scipy.optimize import brentq
 from scipy.sparse.csgraph import connected_components
 
 from maglev.arrays import ComplexArray
+from maglev.errors import UserError
 from maglev.mechanics.car import N_BOGIES, N_C_FRAMES
 from maglev.mechanics.control import circuits
 from maglev.mechanics.train import TrainModel, pole_offsets, pole_static_force
@@ -451,7 +452,7 @@ def border(
 
     Raises
     ------
-    ValueError
+    UserError
         If the train is not stable at the start.
     """
 
@@ -463,7 +464,7 @@ def border(
     values = np.linspace(gains[gain], limit, n_steps + 1)
     before = rate(values[0])
     if not before < 0:
-        raise ValueError(
+        raise UserError(
             f"the train must be stable where the search starts, grows by {before:g} 1/s"
         )
     for inner, outer in itertools.pairwise(values):

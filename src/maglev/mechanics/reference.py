@@ -374,7 +374,7 @@ def integrate(
 
     Raises
     ------
-    ValueError
+    UserError
         If the gains have the wrong shape or are not finite.
     RuntimeError
         If a step does not converge.
@@ -384,12 +384,13 @@ def integrate(
     Newmark, J. Eng. Mech. Div. ASCE 85(EM3):67-94 (1959).
     """
     gains = checked_gains(gains, config.gains.further)
+    way = course(config)
     record = passed(
         config,
         profile,
         gains,
-        course(config).time_step,
-        course(config).n_steps,
+        way.time_step,
+        way.n_steps,
         record_every=record_every,
         energy=True,
         progress=progress,
@@ -468,7 +469,7 @@ def solve(
 
     Raises
     ------
-    ValueError
+    UserError
         If the gains have the wrong shape or are not finite.
     RuntimeError
         If a step does not converge, or if the error is above the tolerance with the shortest step.

@@ -15,6 +15,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
+from maglev.errors import UserError
 from maglev.mechanics.bodies import FloatArray, IntArray, assembled, link_rows
 from maglev.mechanics.car import (
     LEFT,
@@ -119,7 +120,7 @@ def build(train: Train) -> TrainModel:
 
     Raises
     ------
-    ValueError
+    UserError
         If the guidance magnets have no preload, the suspension magnets have one, or a pole would
         have to push at rest.
 
@@ -221,7 +222,7 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
 
     Raises
     ------
-    ValueError
+    UserError
         If a pole would have to push, or a single pole to carry a moment.
     """
     kinds = (train.suspension_magnet, train.guidance_magnet)
@@ -232,7 +233,7 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
         lever = np.abs(offset).sum()
         moment = magnets.static_moment[rows, None]
         if lever == 0 and np.any(moment != 0):
-            raise ValueError(
+            raise UserError(
                 "train.suspension_magnet.n_poles must be at least 2 to carry a moment at rest, "
                 f"got {kind.n_poles}"
             )
@@ -240,7 +241,7 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
         force[rows, : kind.n_poles] = magnets.static_force[rows, None] / kind.n_poles + uneven
         least = force[rows, : kind.n_poles].min()
         if not least > 0:
-            raise ValueError(
+            raise UserError(
                 f"each pole must attract at rest, got {least:g} N at a pole of a "
                 f"{'guidance' if is_guidance else 'suspension'} magnet"
             )
@@ -251,12 +252,12 @@ def _checked_preload(train: Train) -> float:
     """Force of a guidance magnet at rest [N]; what the suspension magnets carry is not given."""
     preload = train.guidance_magnet.preload
     if preload is None or not preload > 0:
-        raise ValueError(
+        raise UserError(
             "train.guidance_magnet.preload must be a positive force, such as '10 kN', "
             f"got {preload}"
         )
     if train.suspension_magnet.preload is not None:
-        raise ValueError(
+        raise UserError(
             "train.suspension_magnet.preload must be null, for the magnet carries its share of "
             f"the weight, got {train.suspension_magnet.preload:g} N"
         )

@@ -82,7 +82,7 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
 
     Raises
     ------
-    ValueError
+    UserError
         If a design cannot be fitted.
     """
     levels = config.study.failure_probability

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.mechanics import train
 from maglev.mechanics.course import course
 from maglev.mechanics.moving_load import midspan_deflection
@@ -34,11 +35,11 @@ def dataset(config: Config, passage: xr.Dataset) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If the passage has no histories.
     """
     if "girder_displacement_z_history" not in passage:
-        raise ValueError("deflection: the passage has no histories")
+        raise UserError("deflection: the passage has no histories")
     beam, load = euler_span(config), load_per_length(config)
     entry = -course(config).start + (config.guideway.n_spans // 2) * beam.length
     time = passage["t"]

@@ -75,7 +75,7 @@ def dataset(config: Config, store: str | Path, n_threads: int = 1) -> xr.Dataset
     ------
     ConfigError
         If the measurements cannot be read.
-    ValueError
+    UserError
         As `maglev.simulate`.
     """
     measured = load_measurements(config.validation.measurements).peak_deflection

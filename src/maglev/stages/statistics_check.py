@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import extremes, lost
@@ -89,14 +90,14 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no baseline, or a case has limits and no baseline.
     """
     if not baseline:
-        raise ValueError("the check of the statistics needs at least one baseline, got none")
+        raise UserError("the check of the statistics needs at least one baseline, got none")
     strange = sorted({case for case, _ in limits} - set(baseline))
     if strange:
-        raise ValueError(f"the case '{strange[0]}' has limits and no baseline; run its baseline")
+        raise UserError(f"the case '{strange[0]}' has limits and no baseline; run its baseline")
     checks: list[Check] = []
     for case, runs in baseline.items():
         values, away = extremes(runs), lost(runs)
@@ -129,7 +130,7 @@ def _halves(
     middle = away.size // 2
     parts = [slice(0, middle), slice(middle, 2 * middle)]
     if middle == 0 or any(away[part].all() for part in parts):
-        raise ValueError(f"a half of the baseline of '{case}' has no run that held")
+        raise UserError(f"a half of the baseline of '{case}' has no run that held")
     first, second = (baseline_limits(config, values[part], away[part]) for part in parts)
     checks = []
     for response, (a, b) in enumerate(zip(first, second, strict=True)):

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, method_number
@@ -37,17 +38,17 @@ def dataset(config: Config, limits: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no method, or their failure probabilities differ.
     """
     if not limits:
-        raise ValueError("table 1 needs the limits of at least one method, got none")
+        raise UserError("table 1 needs the limits of at least one method, got none")
     names = sorted(limits, key=METHODS.index)
     levels = limits[names[0]]["failure_probability"].to_numpy()
     for name in names[1:]:
         others = limits[name]["failure_probability"].to_numpy()
         if not np.array_equal(others, levels):
-            raise ValueError(
+            raise UserError(
                 f"limits of '{names[0]}' and '{name}' must be at the same failure probabilities, "
                 f"got {levels} and {others}; compute them again"
             )

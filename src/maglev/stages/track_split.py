@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.density import places
@@ -46,7 +47,7 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If sets differ in size, or fewer than two samples held in all of them.
 
     References
@@ -57,7 +58,7 @@ def dataset(
     sizes = {name: part.sizes["sample"] for name, part in parts.items()}
     n = both.sizes["sample"]
     if set(sizes.values()) != {n}:
-        raise ValueError(f"all sets of runs must have {n} samples, got {sizes}; run them again")
+        raise UserError(f"all sets of runs must have {n} samples, got {sizes}; run them again")
     names = ("gains_only", "track_only")
     sets = {"both": both, **{name: parts[name] for name in names}}
     values = {name: extremes(part) for name, part in {"both": both, **parts}.items()}
