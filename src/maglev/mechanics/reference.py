@@ -384,13 +384,12 @@ def integrate(
     Newmark, J. Eng. Mech. Div. ASCE 85(EM3):67-94 (1959).
     """
     gains = checked_gains(gains, config.gains.further)
-    way = course(config)
     record = passed(
         config,
         profile,
         gains,
-        way.time_step,
-        way.n_steps,
+        course(config).time_step,
+        course(config).n_steps,
         record_every=record_every,
         energy=True,
         progress=progress,
