@@ -1,5 +1,6 @@
 # make all    environment, then every result and figure     make test   environment, then the tests
-# make quick  the same chain on config/quick.yaml            make check  format, lint, contracts, quick tests
+# make quick  the same chain on config/quick.yaml            make lint   all that is asked of the text alone
+# make check  lint, then the quick tests                      make docs   the files written from the code
 # make bench  what a passage costs, one to seven minutes on an idle machine
 
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
@@ -13,7 +14,7 @@ export OMP_NUM_THREADS ?= 1
 # what is installed comes from the lock files alone
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: all quick test check bench docs unlock
+.PHONY: all quick test lint check bench docs unlock
 .DEFAULT_GOAL := all
 
 $(BIN)/python:
@@ -42,12 +43,16 @@ quick: $(VENV)/core.stamp unlock
 test: $(VENV)/dev.stamp
 	pytest --numprocesses $(CORES)
 
-check: $(VENV)/dev.stamp
+# format, lint, contracts of imports, types, and the workflow's own lint
+lint: $(VENV)/dev.stamp
 	ruff format --check .
 	ruff check .
 	lint-imports
+	mypy
 	snakefmt --check Snakefile workflow
 	snakemake --lint
+
+check: lint
 	pytest --numprocesses $(CORES) -m "not slow"
 
 # alone on the machine; BENCH=--quick for a minute's run
@@ -61,3 +66,4 @@ docs: $(VENV)/core.stamp
 	maglev describe parameters > docs/parameters.md
 	maglev describe datasets > docs/datasets.md
 	maglev describe stages > docs/stages.md
+	python workflow/scripts/environments.py

@@ -19,6 +19,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.interpolate import CubicSpline
 from scipy.signal import sosfilt
+from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from maglev.mechanics import guideway as guideway_model
@@ -342,6 +343,7 @@ def energy_of(record: Record) -> Energy:
     return Energy(record.time, on_train, on_guideway, dissipated, record.stored)
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def integrate(
     config: Config,
     profile: Profile,
@@ -384,13 +386,17 @@ def integrate(
     Newmark, J. Eng. Mech. Div. ASCE 85(EM3):67-94 (1959).
     """
     gains = checked_gains(gains, config.gains.further)
-    way = course(config)
     record = passed(
         config,
         profile,
         gains,
+<<<<<<< HEAD
         way.time_step,
         way.n_steps,
+=======
+        course(config).time_step,
+        course(config).n_steps,
+>>>>>>> checks
         record_every=record_every,
         energy=True,
         progress=progress,
@@ -428,6 +434,7 @@ class Effort:
         }
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def solve(
     config: Config,
     profile: Profile,

@@ -60,7 +60,7 @@ def dataset(config: Config, passage: xr.Dataset) -> xr.Dataset:
 STAGE = Stage(
     name="deflection",
     of="run",
-    reads=("train", "guideway", "passage"),
+    reads=("train", "guideway", "irregularity.enabled", "irregularity.fade_in", "passage"),
     inputs={"passage": Input("passage")},
     layout="deflection",
     compute=dataset,
