@@ -390,13 +390,8 @@ def integrate(
         config,
         profile,
         gains,
-<<<<<<< HEAD
-        way.time_step,
-        way.n_steps,
-=======
         course(config).time_step,
         course(config).n_steps,
->>>>>>> checks
         record_every=record_every,
         energy=True,
         progress=progress,
