@@ -28,7 +28,8 @@ def figure(
         The figure and the numbers in it.
     """
     found = curves.densities(densities)
-    looks, words = [], []
+    words = []
+    looks: list[style.Look] = []
     for one, design in zip(densities, designs, strict=True):
         name, look = labels.control_style(design)
         looks.append(look)

@@ -165,7 +165,7 @@ _LATE_COLOUR = {"pole": "#CC79A7", "ends": "#56B4E9", "half": "#E69F00", "lumped
 _GROUP_DASHES = {"pole": "-", "ends": "--", "half": "-.", "lumped": ":"}
 
 
-def control_style(design: xr.Dataset) -> tuple[str, dict[str, object]]:
+def control_style(design: xr.Dataset) -> tuple[str, style.Look]:
     """Words and line for a case by who shares a circuit, and how late its current comes.
 
     Raises
