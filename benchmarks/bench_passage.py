@@ -46,7 +46,7 @@ from maglev.mechanics._kernels import (
 from maglev.mechanics._magnets import attract, circuits_at_rest, empty_magnet
 from maglev.mechanics._records import Motion, Rails
 from maglev.mechanics._rows import zeros
-from maglev.mechanics.course import first_step, n_steps, nose, start, time_step
+from maglev.mechanics.course import course
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Circuit, Config
 from maglev.simulation import _system, track
@@ -222,22 +222,22 @@ class Phase:
 
 def noses(system: integrate.System) -> Array:
     """Place of the nose at every step (step,) [m]."""
-    steps = np.arange(1, n_steps(system.config) + 1)
-    return nose(system.config, steps * time_step(system.config))
+    steps = np.arange(1, course(system.config).n_steps + 1)
+    return course(system.config).nose(steps * course(system.config).time_step)
 
 
 def rail_under_train(system: integrate.System) -> Array:
     """Share (span,) of a span's rail that a mean step moves: its units under the train [-]."""
-    line, place = system.line, noses(system)
-    unit = line.span_length / line.n_units
+    spans, place = system.spans, noses(system)
+    unit = spans.span_length / spans.n_units
     shares = []
-    for span in range(line.n_spans):
-        tail = place - system.config.train.length - span * line.span_length
-        begin = np.clip(np.floor(tail / unit - 1e-6), 0, line.n_units)
+    for span in range(spans.n_spans):
+        tail = place - system.config.train.length - span * spans.span_length
+        begin = np.clip(np.floor(tail / unit - 1e-6), 0, spans.n_units)
         end = np.clip(
-            np.floor((place - span * line.span_length) / unit + 1e-6) + 1, 0, line.n_units
+            np.floor((place - span * spans.span_length) / unit + 1e-6) + 1, 0, spans.n_units
         )
-        shares.append(np.maximum(end - begin, 0).mean() / line.n_units)
+        shares.append(np.maximum(end - begin, 0).mean() / spans.n_units)
     return np.array(shares)
 
 
@@ -245,30 +245,32 @@ def poles_and_coefficients(system: integrate.System) -> tuple[int, float]:
     """Poles of the train, and the rail coefficients under all their faces in a mean step [-]."""
     poles, met = 0, 0
     for places in (system.suspension_places, system.guidance_places):
-        n = n_steps(system.config)
+        n = course(system.config).n_steps
         poles += 2 * places.number.size  # right and left
         # places follow each other, and so do their coefficients
         met += 2 * int(
             (places.start[places.number + n + 1] - places.start[places.number + 1]).sum()
         )
-    return poles, met / n_steps(system.config)
+    return poles, met / course(system.config).n_steps
 
 
 def steps_of_stages(system: integrate.System) -> Array:
-    """Steps that each stage of the guideway lasts (stage,) [-]."""
-    begins = system.line.stages.first_step
-    return np.diff([*begins, n_steps(system.config) + 1])
+    """Steps that each stretch of the guideway lasts (stretch,) [-]."""
+    begins = system.spans.stretches.first_step
+    return np.diff([*begins, course(system.config).n_steps + 1])
 
 
 def operations(system: integrate.System) -> dict[str, float]:
     """Operations of a mean step of one sample in each phase, from the sizes of its arrays."""
-    vehicle, line = system.vehicle, system.line
+    vehicle, spans = system.vehicle, system.spans
     steps = steps_of_stages(system)
     n_dof = vehicle.inverse_mass.size
     # links: what they hang on 3, fused; stretch 2m - 1 and force back 2m for m coefficients
     links = 3 * vehicle.scaled_dof.size + 4 * vehicle.link_coefficient.size
     links -= vehicle.link_start.size - 1
-    moving = 1 - (first_step(system.config) - 1) / n_steps(system.config)  # the train rests before
+    moving = (
+        1 - (course(system.config).first_step - 1) / course(system.config).n_steps
+    )  # the train rests before
     # poles: gap error 3, its rate 3, gap 1, current 4, pull 3, force and moment 3, means 2;
     # a magnet: signs 4, force and moment on the train 6, means 2
     n_poles, n_under = poles_and_coefficients(system)
@@ -280,20 +282,26 @@ def operations(system: integrate.System) -> dict[str, float]:
     # them, right and left from mean and roll; back: forces on those coordinates
     rails = 0.0
     for span, share in enumerate(rail_under_train(system)):
-        moved = np.diff(line.upright_start)[span] + 2 * np.diff(line.sideways_start)[span]
-        rails += share * line.stride * (2 * (2 * moved + 2) + 2 + 2 * moved)
+        moved = np.diff(spans.upright_start)[span] + 2 * np.diff(spans.sideways_start)[span]
+        rails += share * spans.stride * (2 * (2 * moved + 2) + 2 + 2 * moved)
     # guideway, of what is stepped: relative motion and its rate, forces back, stiffness, damping,
     # exact step, pier tops
-    guideway, line_states, stages = 0.0, 0.0, line.stages
-    for stage, share in enumerate(steps / n_steps(system.config)):
-        start, tops, stop = stages.start[stage], stages.tops[stage], stages.start[stage + 1]
-        modes = stages.stepped[start:tops]
-        carried = np.diff(line.carried_start)[modes].sum()
+    guideway, line_states, stretches = 0.0, 0.0, spans.stretches
+    for stretch, share in enumerate(steps / course(system.config).n_steps):
+        start, tops, stop = (
+            stretches.start[stretch],
+            stretches.tops[stretch],
+            stretches.start[stretch + 1],
+        )
+        modes = stretches.stepped[start:tops]
+        carried = np.diff(spans.carried_start)[modes].sum()
         each = slice(start, stop)
-        taken = (stages.taken_to[each] - stages.taken_from[each])[tops - start :].sum()
-        damping = (stages.damping_to[each] - stages.damping_from[each]).sum()
-        between = np.diff(line.stiffness_start)[stages.stepped[tops:stop] - line.square.size].sum()
-        factor = stages.factor_start[stop] - stages.factor_start[tops]
+        taken = (stretches.taken_to[each] - stretches.taken_from[each])[tops - start :].sum()
+        damping = (stretches.damping_to[each] - stretches.damping_from[each]).sum()
+        between = np.diff(spans.stiffness_start)[
+            stretches.stepped[tops:stop] - spans.square.size
+        ].sum()
+        factor = stretches.factor_start[stop] - stretches.factor_start[tops]
         coefficients = carried + taken + modes.size + between + damping + 2 * factor
         guideway += share * (2 * coefficients + (stop - start) + 2 * modes.size + 2 * (stop - tops))
         line_states += share * 8 * (stop - start)
@@ -301,7 +309,7 @@ def operations(system: integrate.System) -> dict[str, float]:
     states = 9 * n_dof * moving + line_states
     # outputs: midspan z and y 4 a column, each section of the low-pass 9, peak of a response 9
     n_sections = packing.run(system.config, 0).sections.shape[0]
-    outputs = 2 * (4 * line.output_column.size + 9 * n_sections)
+    outputs = 2 * (4 * spans.output_column.size + 9 * n_sections)
     outputs += 9 * (4 + 2 * vehicle.body_z.size)
     return {
         "train links": links * moving,
@@ -327,24 +335,24 @@ def _repeat_train(n, vehicle, dt, train):
 
 
 @njit
-def _repeat_answer(n, line, stage, guideway):
+def _repeat_answer(n, spans, stretch, guideway):
     for _ in range(n):
-        _answer(line, stage, guideway)
+        _answer(spans, stretch, guideway)
 
 
 @njit
-def _repeat_advance(n, line, stage, dt, guideway):
+def _repeat_advance(n, spans, stretch, dt, guideway):
     for _ in range(n):
-        _advance_guideway(line.stages, stage, dt, guideway)
+        _advance_guideway(spans.stretches, stretch, dt, guideway)
 
 
 @njit
-def _repeat_rails(n, line, span, guideway, rails, turn, packed):
+def _repeat_rails(n, spans, span, guideway, rails, turn, packed):
     """What the passage does with the rails of one span in a step, there and back."""
     for _ in range(n):
-        _move_span(line, span, 0, line.stride, guideway.position, packed, rails.motion)
-        _move_span(line, span, 0, line.stride, guideway.predicted, packed, rails.rate)
-        _load_span(line, span, 0, line.stride, rails, turn, guideway.force)
+        _move_span(spans, span, 0, spans.stride, guideway.position, packed, rails.motion)
+        _move_span(spans, span, 0, spans.stride, guideway.predicted, packed, rails.rate)
+        _load_span(spans, span, 0, spans.stride, rails, turn, guideway.force)
 
 
 @njit
@@ -366,10 +374,10 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     ``per_step``, the time of a step and sample in a passage [s], is states, outputs and the loop.
     """
     counted = operations(system)
-    line, rng = system.line, np.random.default_rng(3)
-    vehicle, dt = system.vehicle, time_step(system.config)
+    spans, rng = system.spans, np.random.default_rng(3)
+    vehicle, dt = system.vehicle, course(system.config).time_step
     n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
-    n_rail = line.n_spans * line.stride
+    n_rail = spans.n_spans * spans.stride
 
     def rows(n: int, size: float) -> Array:
         """Rows of samples of about a size, where the kernels have theirs."""
@@ -385,7 +393,7 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     scaled, link_pull = zeros(vehicle.scaled_dof.size), zeros(vehicle.link_start.size - 1)
     guideway, guideway_resting = motion(n_line, 1e-5), at_rest(n_line)
     rails = Rails(*(rows(3 * n_rail, 1e-5).reshape((3, n_rail, LANES)) for _ in range(3)))
-    turn, packed = zeros(line.stride), zeros(line.upright.size + line.sideways.size)
+    turn, packed = zeros(spans.stride), zeros(spans.upright.size + spans.sideways.size)
     run = packing.run(system.config, 0)
     kinds = (system.suspension, system.guidance)
     outcome = packing.empty_outcome(system.train, kinds, run)
@@ -402,17 +410,19 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     links = moving * per_call(2000, lambda n: _repeat_links(n, vehicle, train, scaled, link_pull))
     states = moving * per_call(2000, lambda n: _repeat_train(n, vehicle, dt, resting))
     stepped = 0.0
-    for stage, share in enumerate(steps_of_stages(system) / run.n_steps):
-        stepped += share * per_call(500, lambda n, at=stage: _repeat_answer(n, line, at, guideway))
+    for stretch, share in enumerate(steps_of_stages(system) / run.n_steps):
+        stepped += share * per_call(
+            500, lambda n, at=stretch: _repeat_answer(n, spans, at, guideway)
+        )
         states += share * per_call(
-            500, lambda n, at=stage: _repeat_advance(n, line, at, dt, guideway_resting)
+            500, lambda n, at=stretch: _repeat_advance(n, spans, at, dt, guideway_resting)
         )
     shares = rail_under_train(system)
     of_rails = sum(
         share
         * per_call(
             1000,
-            lambda n, span=span: _repeat_rails(n, line, span, guideway, rails, turn, packed),
+            lambda n, span=span: _repeat_rails(n, spans, span, guideway, rails, turn, packed),
         )
         for span, share in enumerate(shares)
     )
@@ -466,11 +476,11 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
 
 def step_bytes(system: integrate.System) -> tuple[int, int]:
     """Bytes that a row of samples goes through in a step: states, and matrices they share."""
-    line, vehicle = system.line, system.vehicle
+    spans, vehicle = system.spans, system.vehicle
     n_dof, n_line = vehicle.inverse_mass.size, system.reduced.n_coordinates
     rows = 5 * n_dof + vehicle.scaled_dof.size + vehicle.link_start.size - 1
-    rows += 5 * n_line + 9 * line.n_spans * line.stride
-    shared = [*line, *line.stages, *vehicle]
+    rows += 5 * n_line + 9 * spans.n_spans * spans.stride
+    shared = [*spans, *spans.stretches, *vehicle]
     tables = sum(array.nbytes for array in shared if isinstance(array, np.ndarray))
     return rows * LANES * 8, tables
 
@@ -540,8 +550,8 @@ def reference_time(config: Config, seconds: float) -> Reference:
     """
     resting, _ = step_time(config, seconds / 2)
     running, steps = step_time(with_part(config, "passage", approach=1e-3), seconds)
-    before = int(-start(config) / config.passage.speed / time_step(config))
-    whole = resting * before + running * (n_steps(config) - before)
+    before = int(-course(config).start / config.passage.speed / course(config).time_step)
+    whole = resting * before + running * (course(config).n_steps - before)
     return Reference(resting, running, steps, whole)
 
 
@@ -655,7 +665,7 @@ def grown(configs: dict[int, Config]) -> list[Row]:
         prepared = time.process_time() - began
         gains = gains_of(config, LANES)
         run = timed(lambda system=system, gains=gains: integrate.integrate(system, gains))
-        rows.append(Row(size, run.process / LANES, n_steps(config), prepared))
+        rows.append(Row(size, run.process / LANES, course(config).n_steps, prepared))
         tell(f"  {size}: {rows[-1].cost:.3f} s a passage, prepared in {prepared:.2f} s")
     return rows
 
@@ -666,7 +676,7 @@ def batches(config: Config, counts: tuple[int, ...]) -> list[Row]:
     for count in counts:
         gains, begun = gains_of(config, count), time.process_time()
         passages = integrate.integrate(_system(config), gains)
-        rows.append(Row(count, time.process_time() - begun, n_steps(config)))
+        rows.append(Row(count, time.process_time() - begun, course(config).n_steps))
         if passages.status.any():
             raise RuntimeError(f"{np.count_nonzero(passages.status)} samples lost levitation")
         tell(f"  {count}: {rows[-1].cost:.2f} s, {rows[-1].cost / count:.3f} s a passage")
@@ -791,7 +801,7 @@ def measure(sizes: Sizes) -> Results:
     results.ceiling = ceiling(sizes)
     tell(f"  {results.ceiling.flops / 1e9:.1f} GFLOP/s, {results.ceiling.bytes / 1e9:.1f} GB/s")
     tell("phases")
-    results.phases = phases(system, results.per_passage / n_steps(config))
+    results.phases = phases(system, results.per_passage / course(config).n_steps)
     results.bytes = step_bytes(system)
     tell("reference solver")
     results.reference = reference_time(config, sizes.reference_seconds)
@@ -819,7 +829,7 @@ def table(head: list[str], rows: list[list[str]]) -> list[str]:
 
 def phase_rows(results: Results, config: Config) -> list[list[str]]:
     """Operations, time, rate and shares of every phase; whole step last."""
-    per_step = results.per_passage / n_steps(config)
+    per_step = results.per_passage / course(config).n_steps
     total = sum(p.operations for p in results.phases if p.seconds is not None)
     rows = []
     for phase in [*results.phases, Phase("**whole step**", total, per_step)]:
@@ -860,7 +870,7 @@ def page(results: Results, sizes: Sizes) -> str:
     longer = spans.get(20, most)
     many = [row for row in results.samples if row.size % LANES == 0 or row.size >= 10 * LANES]
     rate = results.phases and sum(p.operations for p in results.phases if p.seconds is not None)
-    rate = rate * n_steps(config) / results.per_passage
+    rate = rate * course(config).n_steps / results.per_passage
     base_wall = projected(results, results.per_passage, least.prepared)
     long_wall = projected(results, longer.cost, longer.prepared)
     n_most = results.samples[-1].size
@@ -874,10 +884,10 @@ def page(results: Results, sizes: Sizes) -> str:
         f"Python {platform.python_version()}, NumPy {np.__version__}.  The run took "
         f"{results.wall / 60:.1f} minutes.",
         f"Default configuration: {config.train.n_cars} cars, {config.guideway.n_spans} spans, "
-        f"{config.passage.speed * 3.6:.0f} km/h, {n_steps(config)} steps of "
-        f"{time_step(config) * 1e3:.3f} ms, modes to {config.passage.mode_cutoff:g} Hz at midspan "
-        f"and {config.passage.mode_cutoff_elsewhere:g} Hz elsewhere, rows of {LANES} samples.  "
-        "Seconds are process time on one core unless they are called wall.",
+        f"{config.passage.speed * 3.6:.0f} km/h, {course(config).n_steps} steps of "
+        f"{course(config).time_step * 1e3:.3f} ms, modes to {config.passage.mode_cutoff:g} Hz at "
+        f"midspan and {config.passage.mode_cutoff_elsewhere:g} Hz elsewhere, rows of {LANES} "
+        "samples.  Seconds are process time on one core unless they are called wall.",
         "",
         *(
             [
@@ -1001,7 +1011,7 @@ def page(results: Results, sizes: Sizes) -> str:
         "",
         f"One sample, same configuration: {results.reference.resting * 1e3:.2f} ms a step before "
         f"the guideway and {results.reference.running * 1e3:.2f} ms over the first "
-        f"{results.reference.steps} steps on it, extrapolated to {n_steps(config)} steps: "
+        f"{results.reference.steps} steps on it, extrapolated to {course(config).n_steps} steps: "
         f"{results.reference.passage:.0f} s.  A step grows slower as more of the train is on the "
         "guideway, so a whole passage takes longer than this.",
         "",

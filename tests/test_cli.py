@@ -1,8 +1,11 @@
 """The command line: a user's mistake ends in one sentence, never in a traceback."""
 
+import errno
+import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -74,3 +77,32 @@ def test_the_configuration_is_printed_in_si_with_units():
 def test_help_does_not_wait_for_compiled_parts():
     code = "import maglev.cli, sys; assert not {'numba', 'xarray', 'scipy'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_fault_of_the_program_shows_its_traceback(monkeypatch, tmp_path):
+    def faulty(*_):
+        np.zeros(3).reshape(2, 2)
+
+    monkeypatch.setattr("maglev.figures.draw", faulty)
+    given = ["figure", "modes", "a.nc", "--out", str(tmp_path / "figure")]
+    result = CliRunner().invoke(main, given)
+    assert isinstance(result.exception, ValueError)
+    assert "cannot reshape" in str(result.exception)
+    assert "Error:" not in result.output
+
+
+def test_a_file_that_must_not_be_read_is_named_in_one_line(monkeypatch, tmp_path):
+    def forbidden(*_):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), "a.nc")
+
+    monkeypatch.setattr("maglev.figures.draw", forbidden)
+    code, line = failure("figure", "modes", "a.nc", "--out", str(tmp_path / "figure"))
+    assert (code, line) == (1, "Error: a.nc: permission denied")
+
+
+def test_a_file_of_another_kind_is_refused_in_one_line(tmp_path):
+    (tmp_path / "a.nc").write_text("text")
+    given = ("figure", "modes", str(tmp_path / "a.nc"), "--out", str(tmp_path / "figure"))
+    code, line = failure(*given)
+    assert code == 1
+    assert f"{tmp_path / 'a.nc'} cannot be read as NetCDF" in line

@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from maglev.config import ConfigError, load_config
+    from maglev.config import load_config
+    from maglev.errors import ConfigError, UserError
     from maglev.simulation import simulate
 
-__all__ = ["ConfigError", "load_config", "simulate"]
+__all__ = ["ConfigError", "UserError", "load_config", "simulate"]
 
 _HOME = {
-    "ConfigError": "maglev.config",
+    "ConfigError": "maglev.errors",
+    "UserError": "maglev.errors",
     "load_config": "maglev.config",
     "simulate": "maglev.simulation",
 }

@@ -8,6 +8,9 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 """Real numbers."""
 
+ComplexArray = npt.NDArray[np.complexfloating]
+"""Complex numbers."""
+
 IntArray = npt.NDArray[np.int64]
 """Whole numbers."""
 

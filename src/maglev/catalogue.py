@@ -93,8 +93,9 @@ def _commented(line: str, comment: str, pad: str) -> list[str]:
         return [line]
     if len(line) + len(comment) + 4 <= LINE:
         return [f"{line}  # {comment}"]
-    above = {"initial_indent": f"{pad}# ", "subsequent_indent": f"{pad}#   "}
-    return [*textwrap.wrap(comment, LINE, **above), line]
+    first, later = f"{pad}# ", f"{pad}#   "
+    above = textwrap.wrap(comment, LINE, initial_indent=first, subsequent_indent=later)
+    return [*above, line]
 
 
 def _config_lines(

@@ -2,6 +2,7 @@
 
 The command of a stage follows from its declaration.  A user's mistake ends with one sentence on
 standard error and exit code 2 (the command line or the configuration) or 1 (anything found later).
+Any other exception is a fault of the program and shows its traceback.
 """
 
 from __future__ import annotations
@@ -13,12 +14,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from maglev.errors import ConfigError, UserError
 from maglev.figures import FIGURES
 
 if TYPE_CHECKING:
     from maglev.stage import Stage
 
 _File = click.Path(path_type=Path)
+
+
+class _BadConfiguration(click.ClickException):
+    """A mistake in the configuration ends as one on the command line does."""
+
+    exit_code = 2
 
 
 class _Commands(click.Group):
@@ -49,14 +57,18 @@ class _Commands(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
-        except (ValueError, FileNotFoundError) as error:
+        except (UserError, FileNotFoundError, PermissionError) as error:
             if ctx.params["traceback"]:
                 raise
-            from maglev.config import ConfigError
+            failure = _BadConfiguration if isinstance(error, ConfigError) else click.ClickException
+            raise failure(_sentence(error)) from error
 
-            failure = click.ClickException(" ".join(str(error).split()))
-            failure.exit_code = 2 if isinstance(error, ConfigError) else 1
-            raise failure from error
+
+def _sentence(error: UserError | OSError) -> str:
+    """Our own words in one line, or a file's name with what the system says of it."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
+    return " ".join(str(error).split())
 
 
 @click.group(cls=_Commands)
@@ -113,7 +125,7 @@ def _command(stage: Stage) -> click.Command:
         return click.Option([flag(name), name], **settings)
 
     overlays = "Configuration file; given again, later files overlay earlier ones."
-    options = [option("config", _File, overlays, multiple=True)]
+    options: list[click.Parameter] = [option("config", _File, overlays, multiple=True)]
     if stage.of != "run":
         options.append(option("case", str, "Name of the case."))
     if stage.of == "method":
@@ -121,9 +133,9 @@ def _command(stage: Stage) -> click.Command:
     for role, one in stage.inputs.items():
         words = f"File of the layout '{one.layout}'."
         if one.by:
-            kind = (*[str] * len(one.by), _File)
+            types = (*[str] * len(one.by), _File)
             words = f"{' and '.join(one.by).capitalize()}, and file of the layout '{one.layout}'."
-            options.append(option(role, kind, words, multiple=True))
+            options.append(option(role, types, words, multiple=True))
         else:
             always = not one.optional and set(stage.methods) <= set(one.methods)
             options.append(option(role, _File, words, required=always))
@@ -138,8 +150,9 @@ def _command(stage: Stage) -> click.Command:
         elif name not in ("case", "method"):
             options.append(option(name, kind, f"Which {name}."))
     options.append(option("out", _File, "NetCDF file to write."))
-    words = summary(stage.name)
-    return click.Command(stage.command, params=options, help=words, callback=_run(stage))
+    return click.Command(
+        stage.command, params=options, help=summary(stage.name), callback=_run(stage)
+    )
 
 
 def _run(stage: Stage) -> Callable[..., None]:

@@ -17,11 +17,8 @@ import yaml
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
+from maglev.errors import ConfigError
 from maglev.parameters import Config, Parameters
-
-
-class ConfigError(ValueError):
-    """A mistake in a configuration, told in one sentence that names the key or the file."""
 
 
 class _UniqueKeys(yaml.SafeLoader):

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.vocabulary import (
     DECISIONS,
@@ -80,7 +81,7 @@ class Variable:
     def attributes(self) -> dict[str, Any]:
         """The attributes that stand with the variable in a file."""
         if self.units in (OF_RESPONSE, PER_RESPONSE):
-            units = RESPONSE_UNITS.values()
+            units = list(RESPONSE_UNITS.values())
             if self.units == PER_RESPONSE:
                 units = [{"m": "m-1", "m s-2": "m-1 s2"}[unit] for unit in units]
             return {"long_name": self.long_name, "units_by_response": ", ".join(units)}
@@ -1123,25 +1124,29 @@ def check(dataset: xr.Dataset, layout: str) -> None:
         If a variable is missing or unexpected, or has another unit or other dimensions than
         `VARIABLES` says.
     """
+    mistake = _mistake(dataset, layout)
+    if mistake is not None:
+        raise ValueError(mistake)
+
+
+def _mistake(dataset: xr.Dataset, layout: str) -> str | None:
+    """Where a dataset first departs from its layout, as a sentence."""
     known = LAYOUTS[layout]
     for name in known.variables:
         if name not in dataset.variables:
-            raise ValueError(f"{layout}: '{name}' is missing")
+            return f"{layout}: '{name}' is missing"
     for name in map(str, dataset.variables):
         if name in dataset.dims:
             continue
         if name not in (*known.variables, *known.optional):
-            raise ValueError(f"{layout}: '{name}' does not belong here")
+            return f"{layout}: '{name}' does not belong here"
         expected, found = VARIABLES[name], dataset[name]
         if tuple(found.dims) != expected.dims:
-            raise ValueError(
-                f"{layout}: '{name}' must stand on {expected.dims}, got {tuple(found.dims)}"
-            )
-        if "units" in expected.attributes and found.attrs.get("units") != expected.units:
-            raise ValueError(
-                f"{layout}: '{name}' must be in '{expected.units}', "
-                f"got '{found.attrs.get('units')}'"
-            )
+            return f"{layout}: '{name}' must stand on {expected.dims}, got {tuple(found.dims)}"
+        units = found.attrs.get("units")
+        if "units" in expected.attributes and units != expected.units:
+            return f"{layout}: '{name}' must be in '{expected.units}', got '{units}'"
+    return None
 
 
 def provenance(
@@ -1249,11 +1254,20 @@ def read(path: str | Path, layout: str) -> xr.Dataset:
     ------
     FileNotFoundError
         If there is no such file.
-    ValueError
-        If it is not of that layout, as `check` says.
+    PermissionError
+        If it must not be read.
+    UserError
+        If it is not NetCDF, or not of that layout, as `check` says.
     """
     if not Path(path).is_file():
         raise FileNotFoundError(f"there is no file {path}")
-    dataset = xr.load_dataset(path, engine="netcdf4")
-    check(dataset, layout)
+    try:
+        dataset = xr.load_dataset(path, engine="netcdf4")
+    except PermissionError:
+        raise
+    except OSError as error:
+        raise UserError(f"{path} cannot be read as NetCDF: {error.strerror}") from error
+    mistake = _mistake(dataset, layout)
+    if mistake is not None:
+        raise UserError(f"{path} is not of its layout: {mistake}")
     return dataset

@@ -25,6 +25,7 @@ from pydantic import (
     model_validator,
 )
 
+from maglev.errors import UserError
 from maglev.vocabulary import GAIN_KEYS, GROUPS, Gain, Group, Method, Response, Surrogate
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def _units() -> pint.UnitRegistry:
 def quantity(
     unit: str,
     meaning: str,
-    default: float | str,
+    default: float | str | None,
     *,
     source: str,
     confidence: Literal["H", "M", "L"],
@@ -93,7 +94,7 @@ def quantity(
     extra: dict[str, Any] = {"unit": unit, "source": source, "confidence": confidence}
     if isinstance(default, str):
         extra["written"] = default
-    bounds: dict[str, float] = {}
+    bounds: dict[str, Any] = {}
     if minimum is not None:
         bounds["ge"] = minimum
     if above is not None:
@@ -380,7 +381,7 @@ class Magnet(Parameters):
         None,
         source="A",
         confidence="L",
-    )  # type: ignore[arg-type]
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Magnet:
@@ -438,7 +439,7 @@ class Train(Parameters):
                 "current_reference": ["A", "L"],
             }
         },
-    )  # type: ignore[arg-type]
+    )
 
     @model_validator(mode="after")
     def _check(self) -> Train:
@@ -537,7 +538,7 @@ class Rail(Parameters):
                 )
             }
         },
-    )  # type: ignore[arg-type]
+    )
     units_per_span: int = Field(
         8,
         description="functional units a span and side",
@@ -1296,26 +1297,26 @@ class Config(Parameters):
 
         Raises
         ------
-        ValueError
+        UserError
             If a key is none of a case's, or its value will not do.
         """
         changed = self
         for dotted, value in values.items():
             keys = dotted.split(".")
             if keys[0] not in _OF_A_CASE or len(keys) < 2:
-                raise ValueError(
+                raise UserError(
                     f"{place}{dotted} cannot be set for a case alone; the sections that can are "
                     f"{', '.join(_OF_A_CASE)}, such as passage.speed"
                 )
             if dotted == "guideway.n_spans":
-                raise ValueError(f"{place}{dotted} is the case's n_spans: write it there")
+                raise UserError(f"{place}{dotted} is the case's n_spans: write it there")
             try:
                 changed = _with_value(changed, keys, value)
             except ValidationError as error:
                 why = error.errors()[0]["msg"].removeprefix("Value error, ")
-                raise ValueError(f"{place}{dotted}: {why}") from None
+                raise UserError(f"{place}{dotted}: {why}") from None
             except KeyError as error:
-                raise ValueError(
+                raise UserError(
                     f"{place}{dotted} is no key of the configuration: there is no {error.args[0]!r}"
                 ) from None
         return changed
@@ -1337,11 +1338,11 @@ class Config(Parameters):
 
         Raises
         ------
-        ValueError
+        UserError
             If there is no such case.
         """
         if name not in self.cases:
-            raise ValueError(f"there is no case '{name}', known are: {', '.join(self.cases)}")
+            raise UserError(f"there is no case '{name}', known are: {', '.join(self.cases)}")
         own = self.with_case_set(name)
         guideway = own.guideway.model_copy(update={"n_spans": own.cases[name].n_spans})
         return own.model_copy(update={"guideway": guideway})

@@ -9,6 +9,7 @@ import netCDF4
 import numpy as np
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.mechanics.irregularity import PROFILE_NAMES, Measured
 
 _COLUMNS = ("x", "vertical", "lateral", "vertical_left", "lateral_left")
@@ -38,7 +39,7 @@ def read(path: str | Path) -> Measured:
     ------
     FileNotFoundError
         If there is no such file.
-    ValueError
+    UserError
         If it cannot be read as such, a column is missing, of another length or unit, holds what is
         not a finite number, or x does not rise.
     """
@@ -49,29 +50,29 @@ def read(path: str | Path) -> Measured:
     columns = _netcdf_columns(path) if is_netcdf else _csv_columns(path)
     missing = [name for name in _REQUIRED if name not in columns]
     if missing:
-        raise ValueError(
+        raise UserError(
             f"irregularity profile {path} must have the columns {', '.join(_REQUIRED)}; "
             f"missing: {', '.join(missing)}"
         )
     x = columns["x"]
     for name, column in columns.items():
         if column.shape != x.shape or x.ndim != 1:
-            raise ValueError(
+            raise UserError(
                 f"irregularity profile {path}: column {name} must have one value per x, "
                 f"got shape {column.shape} for x of shape {x.shape}"
             )
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
-            raise ValueError(
+            raise UserError(
                 f"irregularity profile {path}: column {name} must be finite, "
                 f"got {column[bad[0]]} in row {bad[0] + 1} of its data"
             )
     if x.size < 2:
-        raise ValueError(f"irregularity profile {path} must have two rows or more, got {x.size}")
+        raise UserError(f"irregularity profile {path} must have two rows or more, got {x.size}")
     falls = np.flatnonzero(np.diff(x) <= 0)
     if falls.size:
         k = falls[0]
-        raise ValueError(
+        raise UserError(
             f"irregularity profile {path}: x must rise from row to row, "
             f"got {x[k]:g} then {x[k + 1]:g} m in rows {k + 1} and {k + 2} of its data"
         )
@@ -94,7 +95,7 @@ def _csv_columns(path: Path) -> dict[str, FloatArray]:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = [row for row in csv.reader(file) if row and not row[0].lstrip().startswith("#")]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"irregularity profile {path} cannot be read as CSV: {error}") from error
+        raise UserError(f"irregularity profile {path} cannot be read as CSV: {error}") from error
     names = [name.strip() for name in lines[0]] if lines else []
     columns: dict[str, FloatArray] = {}
     for name in _COLUMNS:
@@ -107,7 +108,7 @@ def _csv_columns(path: Path) -> dict[str, FloatArray]:
                 values[row] = float(cells[k])
             except (ValueError, IndexError) as error:
                 got = repr(cells[k]) if k < len(cells) else "nothing"
-                raise ValueError(
+                raise UserError(
                     f"irregularity profile {path}: column {name} must hold numbers, got {got} "
                     f"in row {row + 1} of its data"
                 ) from error
@@ -120,9 +121,7 @@ def _netcdf_columns(path: Path) -> dict[str, FloatArray]:
     try:
         dataset = netCDF4.Dataset(path)
     except OSError as error:
-        raise ValueError(
-            f"irregularity profile {path} cannot be read as NetCDF: {error}"
-        ) from error
+        raise UserError(f"irregularity profile {path} cannot be read as NetCDF: {error}") from error
     with dataset:
         columns: dict[str, FloatArray] = {}
         for name in _COLUMNS:
@@ -131,11 +130,11 @@ def _netcdf_columns(path: Path) -> dict[str, FloatArray]:
             variable = dataset.variables[name]
             unit = getattr(variable, "units", "m")
             if unit not in ("m", "metre", "meter", "metres", "meters"):
-                raise ValueError(
+                raise UserError(
                     f"irregularity profile {path}: variable {name} must be in 'm', got {unit!r}"
                 )
             if not np.issubdtype(variable.dtype, np.number):
-                raise ValueError(
+                raise UserError(
                     f"irregularity profile {path}: variable {name} must hold numbers, "
                     f"got {variable.dtype}"
                 )

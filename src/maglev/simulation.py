@@ -11,9 +11,11 @@ import numpy.typing as npt
 import xarray as xr
 
 from maglev import datasets, profiles
+from maglev.errors import UserError
+from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import n_steps, time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile, profile
 from maglev.mechanics.responses import GIRDER_RESPONSES, Passages, checked_gains
 from maglev.parameters import Config
@@ -39,8 +41,9 @@ def simulate(
     ----------
     config
         Parameters of everything, from `maglev.load_config`.
-    gains : (sample, 4)
-        Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m].
+    gains : (sample, 4) or (sample, 8)
+        Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m]; then suspension k_a
+        [A s²/m], k_i [A/(m s)], guidance k_a, k_i, those of ``config.gains`` if left out.
     histories
         Whether to keep the time series of responses, gaps and currents.
     solver
@@ -60,13 +63,14 @@ def simulate(
         Layout ``passage`` of `maglev.datasets`: on ``sample`` the extremes of the six responses
         [m, m s-2] and their times [s], gaps [m], currents [A], ``status`` and where and when
         levitation was lost; with ``histories`` also the time series on ``t``.  The extremes of a
-        lost sample are NaN.  Attributes ``time_step`` [s], ``n_steps`` and ``track``, the words for
-        the track that the numbers are of; of the reference solver also ``estimated_error``, the
-        largest of any extreme as a share of it, and ``seconds``.
+        lost sample are NaN, as are those of a sample whose gains ask for a smaller step, which is
+        not judged (status ``step_too_large``).  Attributes ``time_step`` [s], ``n_steps`` and
+        ``track``, the words for the track that the numbers are of; of the reference solver also
+        ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
 
     Raises
     ------
-    ValueError
+    UserError
         If the gains have another shape or are not finite, the time step exceeds the stability
         limit, the irregularity is shorter than the run, the solver is unknown, or the seeds are
         not whole numbers from zero, one for each sample of the production solver.
@@ -81,12 +85,14 @@ def simulate(
     """
     gains = checked_gains(gains, config.gains.further)
     if solver not in ("production", "reference"):
-        raise ValueError(f"solver must be 'production' or 'reference', got {solver!r}")
+        raise UserError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
-    every = max(1, int(HISTORY_INTERVAL / time_step(config) * (1 + 1e-9))) if histories else 0
+    every = (
+        max(1, int(HISTORY_INTERVAL / course(config).time_step * (1 + 1e-9))) if histories else 0
+    )
     if solver == "production":
         passages = integrate.integrate(
-            _system(config),
+            _system(config, _track_file_hash(config)),
             gains,
             profile_of=None if seeds is None else lambda k: track(config, seeds[k]),
             record_every=every,
@@ -119,7 +125,7 @@ def track(config: Config, seed: int | None = None) -> Profile:
 
     Raises
     ------
-    ValueError, FileNotFoundError
+    UserError, FileNotFoundError
         If a measured profile cannot be read or is shorter than the run.
     """
     irregularity = config.irregularity
@@ -151,27 +157,35 @@ def track_words(config: Config, seeds: Sequence[int] | None = None) -> str:
 def _checked_seeds(track_seeds: npt.ArrayLike, n_samples: int, solver: str) -> list[int]:
     seeds = np.asarray(track_seeds)
     if seeds.shape != (n_samples,) or seeds.dtype.kind not in "iu" or (seeds < 0).any():
-        raise ValueError(
+        raise UserError(
             f"track_seeds must be {n_samples} whole numbers from zero, one for each sample, "
             f"got {seeds.dtype} of shape {seeds.shape}"
         )
     if solver != "production":
-        raise ValueError(
+        raise UserError(
             "the reference solver takes one track for all samples; leave track_seeds out, "
             "or take the production solver"
         )
     return [int(seed) for seed in seeds]
 
 
+def _track_file_hash(config: Config) -> str:
+    """Hash of the measured irregularity; empty where there is none."""
+    irregularity = config.irregularity
+    name = irregularity.profile_file if irregularity.enabled else None
+    return file_hash(name) if name else ""
+
+
 @lru_cache(maxsize=2)
-def _system(config: Config) -> integrate.System:
+def _system(config: Config, _track_file: str) -> integrate.System:
+    """What passages of a configuration stand on, kept for the next call with the same track."""
     return integrate.prepare(config, track(config))
 
 
 def _dataset(
     config: Config, gains: npt.NDArray[np.float64], passages: Passages, histories: bool
 ) -> xr.Dataset:
-    one = ("sample",)
+    one, way = ("sample",), course(config)
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)
     }
@@ -195,7 +209,7 @@ def _dataset(
     variables["status"] = (one, passages.status)
     variables["lost_t"] = (one, passages.lost_time)
     variables["lost_magnet"] = (one, passages.lost_magnet)
-    coordinates = {"sample": np.arange(gains.shape[0]), "car": cars}
+    coordinates: dict[str, npt.NDArray] = {"sample": np.arange(gains.shape[0]), "car": cars}
     if histories:
         for k, name in enumerate(GIRDER_RESPONSES):
             variables[f"{name}_history"] = (("sample", "t"), passages.girder_history[:, k])
@@ -213,5 +227,5 @@ def _dataset(
     return xr.Dataset(
         variables,
         coords=coordinates,
-        attrs={"time_step": time_step(config), "n_steps": n_steps(config)},
+        attrs={"time_step": way.time_step, "n_steps": way.n_steps},
     )

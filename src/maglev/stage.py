@@ -18,6 +18,7 @@ from types import FunctionType, MethodType
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from maglev.config import named_files
+from maglev.errors import UserError
 from maglev.fingerprint import code_of, file_hash
 from maglev.parameters import Config, Parameters
 from maglev.vocabulary import BASELINE, METHODS, Method
@@ -130,12 +131,12 @@ class Stage:
 
         Raises
         ------
-        ValueError
+        UserError
             If it needs a case or a method that is not named.
         """
         for name, given in (("case", case), ("method", method)):
             if given is None and any(f"{{{name}}}" in one for one in self.reads):
-                raise ValueError(f"{self.name}: which {name} must be said, got none")
+                raise UserError(f"{self.name}: which {name} must be said, got none")
         return tuple(one.format(case=case, method=method) for one in (*EVERY_STAGE, *self.reads))
 
     def slice(
@@ -182,13 +183,13 @@ class Stage:
 
         Raises
         ------
-        ValueError
+        UserError
             If there is no such case, or the stage makes nothing for the method.
         """
         if self.of == "method" and method not in self.methods:
-            raise ValueError(f"{self.name} needs a method of {', '.join(self.methods)}: {method}")
+            raise UserError(f"{self.name} needs a method of {', '.join(self.methods)}: {method}")
         if self.reads_of != "run" and case not in config.cases:
-            raise ValueError(f"there is no case '{case}', known are: {', '.join(config.cases)}")
+            raise UserError(f"there is no case '{case}', known are: {', '.join(config.cases)}")
         if case is not None and self.reads_of != "run":
             config = config.with_case_set(case)
         hashes = {name: file_hash(path) for name, path in self.files(config, case, method).items()}
@@ -222,7 +223,7 @@ class Stage:
 
         Raises
         ------
-        ValueError
+        UserError
             If the dataset is not what the stage's layout says.
         """
         from maglev import datasets
@@ -274,8 +275,8 @@ class View:
         self._place, self._files = place, files
 
     def _read(self, name: str) -> Any:
-        is_mapping = isinstance(self._section, Mapping)
-        value = self._section[name] if is_mapping else getattr(self._section, name)
+        section = self._section
+        value = section[name] if isinstance(section, Mapping) else getattr(section, name)
         if name in self._reads:
             return value
         prefix = f"{name}."
@@ -289,8 +290,8 @@ class View:
 
     def __getattr__(self, name: str) -> Any:
         section = self.__dict__.get("_section")
-        kind = type(section)
         if isinstance(section, Parameters):
+            kind = type(section)
             if name in kind.model_fields:
                 return self._read(name)
             found = getattr_static(kind, name, None)
@@ -298,7 +299,7 @@ class View:
                 return found.fget(self)
             if isinstance(found, FunctionType) and not name.startswith("_"):
                 return MethodType(found, self)
-        raise AttributeError(f"{kind.__name__} has no '{name}'")
+        raise AttributeError(f"{type(section).__name__} has no '{name}'")
 
     def __getitem__(self, name: str) -> Any:
         return self._read(name)

@@ -1,5 +1,6 @@
 """Which coordinates of the guideway are stepped when, and what it costs to leave some alone."""
 
+from dataclasses import replace
 from functools import lru_cache
 from unittest import mock
 
@@ -10,7 +11,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from maglev.mechanics import (
     _kernels,
     activity,
-    course,
     guideway,
     integrate,
     irregularity,
@@ -18,7 +18,7 @@ from maglev.mechanics import (
     reduction,
 )
 from maglev.mechanics._records import Motion
-from maglev.mechanics.course import first_step, n_steps, nose, start, time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
 
@@ -35,8 +35,8 @@ def reduced_line():
 
 
 @lru_cache
-def stages():
-    return activity.stages(LINE, reduced_line())
+def stretches():
+    return activity.stretches(LINE, reduced_line())
 
 
 def passed(**constants):
@@ -68,30 +68,34 @@ def test_the_lower_the_modes_that_quiet_spans_keep_the_larger_the_error():
 
 def test_spans_under_the_train_and_beside_it_are_awake_and_so_is_the_middle_one():
     length, n_spans = LINE.guideway.span_length, LINE.guideway.n_spans
-    starts = [stage.first_step for stage in stages()] + [n_steps(LINE) + 1]
+    starts = [stretch.first_step for stretch in stretches()] + [course(LINE).n_steps + 1]
     assert np.all(np.diff(starts) > 0)
-    for stage, begin, end in zip(stages(), starts, starts[1:], strict=False):
-        places = nose(LINE, np.array([begin, end - 1]) * time_step(LINE))
+    for stretch, begin, end in zip(stretches(), starts, starts[1:], strict=False):
+        places = course(LINE).nose(np.array([begin, end - 1]) * course(LINE).time_step)
         tail = int(np.floor((places[0] - LINE.train.length) / length))
         head = int(np.floor(places[1] / length))
         reach = range(tail - activity.AWAKE_BESIDE, head + activity.AWAKE_BESIDE + 1)
         for span in {*reach, n_spans // 2} & set(range(n_spans)):
-            assert stage.awake[reduced_line().span_coordinates[span]].all()
-        assert stage.stepped[stage.awake].all()
-        assert stage.stepped[reduced_line().n_modes :].all()  # pier tops pass motion on
+            assert stretch.awake[reduced_line().span_coordinates[span]].all()
+        assert stretch.stepped[stretch.awake].all()
+        assert stretch.stepped[reduced_line().n_modes :].all()  # pier tops pass motion on
 
 
 def test_most_of_a_long_line_is_not_stepped():
-    share = np.mean([stage.stepped.mean() for stage in stages()])
+    share = np.mean([stretch.stepped.mean() for stretch in stretches()])
     assert share < 0.8
-    # Each stage steps as much as the next, whatever the spans beyond: nothing but ends differ.
-    counts = [stage.awake.sum() for stage in stages()[4:-6]]
+    # Each stretch steps as much as the next, whatever the spans beyond: nothing but ends differ.
+    counts = [stretch.awake.sum() for stretch in stretches()[4:-6]]
     assert max(counts) - min(counts) < 0.2 * np.mean(counts)
 
 
 def test_the_guideway_rests_until_the_nose_reaches_it():
-    first = stages()[0].first_step
-    assert nose(LINE, first * time_step(LINE)) >= 0 > nose(LINE, (first - 1) * time_step(LINE))
+    first = stretches()[0].first_step
+    assert (
+        course(LINE).nose(first * course(LINE).time_step)
+        >= 0
+        > course(LINE).nose((first - 1) * course(LINE).time_step)
+    )
 
 
 def test_tops_that_modes_follow_have_their_mass():
@@ -122,18 +126,18 @@ def stepped_periods(step):
     config = config.model_copy(
         update={"passage": config.passage.model_copy(update={"speed": 0.258 / 4 / step})}
     )
-    assert_allclose(time_step(config), step, rtol=1e-9)
+    assert_allclose(course(config).time_step, step, rtol=1e-9)
     passage = config.passage
     reduced = reduction.reduce(
         guideway.build(config.guideway), passage.mode_cutoff, passage.mode_cutoff_elsewhere
     )
-    line, n = packing.line(reduced, config), reduced.n_coordinates
+    spans, n = packing.spans(reduced, config), reduced.n_coordinates
     operator = np.zeros((n, n))
     for first in range(0, n, LANES):
         motion = _kernels.at_rest(n)
         columns = np.arange(first, min(first + LANES, n))
         motion.position[columns, columns - first] = 1.0
-        _kernels._answer(line, 0, motion)
+        _kernels._answer(spans, 0, motion)
         operator[:, columns] = -motion.force[:, : columns.size]
     squares = np.sort(np.linalg.eigvals(operator).real)
     found = 2 / step * np.arcsin(step / 2 * np.sqrt(squares))
@@ -177,14 +181,16 @@ def test_with_all_modes_kept_quiet_spans_change_no_bit():
 
 def test_coordinates_that_fall_quiet_are_left_at_rest():
     profile = irregularity.profile(LINE.irregularity, track_range(LINE), LINE.seed)
-    stages = integrate.prepare(LINE, profile).line.stages
+    stretches = integrate.prepare(LINE, profile).spans.stretches
     n = reduced_line().n_coordinates
-    ends = np.flatnonzero(np.diff(stages.stilled_start))
+    ends = np.flatnonzero(np.diff(stretches.stilled_start))
     assert ends.size > 3
-    for stage in ends:
+    for stretch in ends:
         arrays = Motion(*(np.ones((n, LANES)) for _ in range(5)))
-        _kernels._still(stages, stage, arrays)
-        stilled = stages.stilled[stages.stilled_start[stage] : stages.stilled_start[stage + 1]]
+        _kernels._still(stretches, stretch, arrays)
+        stilled = stretches.stilled[
+            stretches.stilled_start[stretch] : stretches.stilled_start[stretch + 1]
+        ]
         assert np.all(stilled < reduced_line().n_modes)
         for array in arrays:
             assert not array[stilled].any()
@@ -194,8 +200,8 @@ def test_coordinates_that_fall_quiet_are_left_at_rest():
 def test_poles_meet_the_joints_half_way_between_steps():
     for speed in ("430 km/h", "217 km/h"):
         config = Config.model_validate({"passage": {"speed": speed}})
-        advance = config.passage.speed * time_step(config)
-        assert -config.passage.approach - advance < start(config) <= -config.passage.approach
+        advance = config.passage.speed * course(config).time_step
+        assert -config.passage.approach - advance < course(config).start <= -config.passage.approach
         system = integrate.prepare(
             config, irregularity.profile(config.irregularity, track_range(config), config.seed)
         )
@@ -217,11 +223,12 @@ def test_the_train_rests_until_it_meets_the_track():
     profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
     gains = np.array([config.gains.as_row])
     found = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
-    with mock.patch.object(packing, "first_step", lambda _: 1):
+    from_the_start = replace(course(config), first_step=1)
+    with mock.patch.object(packing, "course", lambda _: from_the_start):
         whole = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
-    first = first_step(config)
-    assert nose(config, (first + 1) * time_step(config)) > -10.0
-    assert nose(config, (first - 1) * time_step(config)) <= -10.0
+    first = course(config).first_step
+    assert course(config).nose((first + 1) * course(config).time_step) > -10.0
+    assert course(config).nose((first - 1) * course(config).time_step) <= -10.0
     for name in ("girder", "body_z", "body_y", "gap_min", "gap_max", "current_max"):
         assert_allclose(getattr(found, name), getattr(whole, name), rtol=1e-9, err_msg=name)
     assert_allclose(found.gap_history, whole.gap_history, rtol=0, atol=1e-12)
@@ -232,4 +239,4 @@ def test_the_train_rests_until_it_meets_the_track():
 def test_an_even_number_of_steps_goes_into_the_pole_passing_where_kinds_stand_half_a_pitch_apart():
     period = 0.258 / (430 / 3.6)
     odd = Config.model_validate({"passage": {"time_step": f"{period / 5 * 1.001} s"}})
-    assert_allclose(period / course.time_step(odd), 6, rtol=1e-9)
+    assert_allclose(period / course(odd).time_step, 6, rtol=1e-9)

@@ -14,7 +14,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev.mechanics import _kernels, _rows, integrate, irregularity, packing
-from maglev.mechanics.course import n_steps, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, minimum, store
 from maglev.parameters import Config
 
@@ -219,7 +219,7 @@ SHORT = {
     },
     "guideway": {"n_spans": 1, "span_length": "6.192 m", "rail": {"units_per_span": 2}},
     "irregularity": {"fade_in": "1 m", "vertical": {"law": "power", "coefficient": 2.3e-10}},
-    "passage": {"approach": "1 m", "speed": "1500 m/s", "acceleration_band": None},
+    "passage": {"approach": "1 m", "speed": "1500 m/s"},
 }
 """A very short and fast passage: steps by the tens."""
 
@@ -227,7 +227,7 @@ SHORT = {
 def short_passage():
     """Extremes and histories of two samples."""
     config = Config.model_validate(SHORT)
-    assert n_steps(config) < 80
+    assert course(config).n_steps < 80
     profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
     gains = np.array(config.gains.as_row) * [[1.0, 1.0, 1.0, 1.0], [1.1, 0.9, 1.2, 0.8]]
     passages = integrate.integrate(integrate.prepare(config, profile), gains, record_every=1)

@@ -75,7 +75,7 @@ class Stand:
         mass = [rows.mass, rows.inertia] * 2
         self.vehicle = packing.vehicle(TRAIN)._replace(inverse_mass=1 / np.array(mass))
         self.train = _kernels.at_rest(4)
-        self.rails = _kernels._straight_rails(packing_line())
+        self.rails = _kernels._straight_rails(packed_spans())
         self.magnet = _magnets.empty_magnet(rows, self.law)
         self.circuits = _magnets.circuits_at_rest(rows, self.law)
         self.watch = _kernels._new_watch(2, 1, 1)
@@ -103,8 +103,8 @@ class Stand:
 
 
 @lru_cache
-def packing_line():
-    return system_of(CONFIG).line
+def packed_spans():
+    return system_of(CONFIG).spans
 
 
 @lru_cache
@@ -344,7 +344,7 @@ LONG = Config.model_validate({"train": {"n_cars": 1}, "guideway": {"n_spans": 3}
 @pytest.mark.parametrize("kind", [0, 1], ids=["suspension", "guidance"])
 @pytest.mark.parametrize("group", GROUPS)
 def test_train_and_rails_pull_at_each_other_with_one_force_and_one_moment(group, kind, monkeypatch):
-    monkeypatch.setattr(f"{__name__}.packing_line", lambda: system_of(LONG).line)
+    monkeypatch.setattr(f"{__name__}.packed_spans", lambda: system_of(LONG).spans)
     system = system_of(LONG)
     step = middle_step(system)
     gains = [K_P, K_D, K_P, K_D, 0.1, K_I, 0.1, K_I]
@@ -380,7 +380,7 @@ def test_train_and_rails_pull_at_each_other_with_one_force_and_one_moment(group,
 @pytest.mark.parametrize("kind", [0, 1], ids=["suspension", "guidance"])
 def test_poles_give_the_rails_the_power_that_the_gaps_lose(kind, monkeypatch):
     """Force times rate of the mean motion under the face, less what goes with the pole's travel."""
-    monkeypatch.setattr(f"{__name__}.packing_line", lambda: system_of(LONG).line)
+    monkeypatch.setattr(f"{__name__}.packed_spans", lambda: system_of(LONG).spans)
     system = system_of(LONG)
     step = middle_step(system)
     stand = shaken(system, kind, Circuit(), step, [K_P, K_D, K_P, K_D, 0, 0, 0, 0])

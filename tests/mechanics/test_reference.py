@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from maglev.mechanics import course as course_module
 from maglev.mechanics import (
-    course,
     guideway,
     integrate,
     irregularity,
@@ -17,7 +17,7 @@ from maglev.mechanics import (
     reference_magnets,
 )
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import n_steps, time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.responses import checked_gains
 from maglev.parameters import Config, Control
 
@@ -273,7 +273,7 @@ def test_a_train_on_smooth_rigid_track_stays_at_rest(group):
     config = controlled(small(5), group=group, lag="1 ms", delay="0.5 ms")
     smooth = config.irregularity.model_copy(update={"enabled": False})
     config = config.model_copy(update={"irregularity": smooth})
-    step = time_step(config)
+    step = course(config).time_step
     before_the_guideway = int(config.passage.approach / config.passage.speed / step)
     gains, profile = checked_gains([MEAN]), profile_of(config)
     record = reference.passed(config, profile, gains, step, before_the_guideway)
@@ -355,7 +355,7 @@ def orders():
     place.  Six steps in a pole-passing period are the fewest: with less, harmonics of the load,
     which has kinks where faces meet joints, fold into its mean.
     """
-    with mock.patch.object(course, "JOINT_SHARE", 0.0):
+    with mock.patch.object(course_module, "JOINT_SHARE", 0.0):
         return _orders()
 
 
@@ -391,9 +391,9 @@ def test_the_error_falls_with_the_square_of_the_step(quantity):
 def test_steps_fit_the_pole_passing():
     for upper in (0.1e-3, 0.25e-3, 1e-3):
         config = Config.model_validate({"passage": {"time_step": f"{upper} s"}})
-        parts = PERIOD / time_step(config)
+        parts = PERIOD / course(config).time_step
         assert_allclose(parts, round(parts), rtol=1e-9)
         assert round(parts) % 2 == 0  # suspension and guidance poles stand half a pitch apart
-        assert upper * (1 - 2 / parts) < time_step(config) <= upper * (1 + 1e-9)
+        assert upper * (1 - 2 / parts) < course(config).time_step <= upper * (1 + 1e-9)
     way = 150 + 2 * 5 * 24.768
-    assert n_steps(Config()) * time_step(Config()) >= way / (430 / 3.6) - 1e-9
+    assert course(Config()).n_steps * course(Config()).time_step >= way / (430 / 3.6) - 1e-9

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from maglev.errors import UserError
+
 FIGURES: Mapping[str, tuple[str, ...]] = {
     "irregularity": ("irregularity",),
     "deflection": ("deflection", "dynamic_factor"),
@@ -49,7 +51,7 @@ def layouts_of(name: str, n_files: int) -> list[tuple[str, ...]]:
 
     Raises
     ------
-    ValueError
+    UserError
         If the figure needs more or fewer files.
     """
     entries = FIGURES[name]
@@ -57,9 +59,7 @@ def layouts_of(name: str, n_files: int) -> list[tuple[str, ...]]:
     left = n_files - (len(entries) - starred)
     if (starred == 0 and left != 0) or (starred and (left < starred or left % starred)):
         many = "any number of each *" if starred else f"{len(entries)} files"
-        raise ValueError(
-            f"figure {name} is drawn from {many} ({', '.join(entries)}), got {n_files}"
-        )
+        raise UserError(f"figure {name} is drawn from {many} ({', '.join(entries)}), got {n_files}")
     return [(one[:-1],) * (left // starred) if one.endswith("*") else (one,) for one in entries]
 
 
@@ -79,7 +79,7 @@ def draw(name: str, data: Sequence[str | Path], out: str | Path) -> None:
     ------
     FileNotFoundError
         If a file is missing.
-    ValueError
+    UserError
         If there are more or fewer files than the figure needs, or a file is of another layout.
     """
     from importlib import import_module

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from maglev.errors import UserError
 from maglev.figures import labels, style
 from maglev.vocabulary import METHODS
 
@@ -30,7 +31,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
 
     Raises
     ------
-    ValueError
+    UserError
         If the baseline carries no limit of a response.
     """
     levels = data["failure_probability"].to_numpy()
@@ -39,7 +40,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         at = data.isel(response=response)
         carried = np.flatnonzero(np.isfinite(at["reference_held_limit"].to_numpy()))
         if carried.size == 0:
-            raise ValueError("figure accuracy: the baseline carries no limit; give it more runs")
+            raise UserError("figure accuracy: the baseline carries no limit; give it more runs")
         level = carried[np.argmin(levels[carried])]
         at = at.isel(failure_probability=level)
         noise = float(at["reference_held_half_width"])

@@ -10,7 +10,9 @@ from matplotlib.axes import Axes
 
 from maglev.arrays import FloatArray
 from maglev.datasets import VARIABLES
+from maglev.errors import UserError
 from maglev.figures import labels
+from maglev.figures.style import Look
 from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
 
 _ENDS = ("", "_low", "_high")
@@ -57,14 +59,14 @@ def limits(data: Sequence[xr.Dataset]) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If their failure probabilities differ.
     """
     levels = data[0]["failure_probability"].to_numpy()
     columns: dict[str, list[FloatArray]] = {}
     for one in data:
         if not np.array_equal(one["failure_probability"].to_numpy(), levels):
-            raise ValueError("all limits must be at the same failure probabilities")
+            raise UserError("all limits must be at the same failure probabilities")
         for name in ("limit", "held_limit"):
             given = one[f"{name}_status"].to_numpy() == _GIVEN
             infinite = one[f"{name}_status"].to_numpy() == _INFINITE
@@ -106,9 +108,7 @@ def body(curves: xr.Dataset, response: int, tail: float) -> tuple[float, float]:
     return min(low) - margin, max(high) + margin
 
 
-def draw_densities(
-    axis: Axes, curves: xr.Dataset, response: int, styles: Sequence[dict[str, object]]
-) -> None:
+def draw_densities(axis: Axes, curves: xr.Dataset, response: int, styles: Sequence[Look]) -> None:
     """Draw the densities of a response, each with its band if it has one.
 
     Curves that tower over the widest ones run out of the panel; their peaks are then written, in
@@ -123,7 +123,7 @@ def draw_densities(
         value = shown.scale * one["curve_value"]
         low, high = (one[f"curve_density{end}"].to_numpy() / shown.scale for end in _ENDS[1:])
         if np.isfinite(low).any():
-            axis.fill_between(value, low, high, color=str(look["color"]), alpha=0.18, lw=0)
+            axis.fill_between(value, low, high, color=look["color"], alpha=0.18, lw=0)
         axis.plot(value, one["curve_density"] / shown.scale, **look)
     beyond = [k for k in range(len(styles)) if peaks[k] > top]
     if beyond:
@@ -133,7 +133,7 @@ def draw_densities(
             0.98,
             0.97 - 0.1 * row,
             f"peak {peaks[k]:,.0f}" if peaks[k] >= 1e3 else f"peak {peaks[k]:.3g}",
-            color=str(styles[k]["color"]),
+            color=styles[k]["color"],
             transform=axis.transAxes,
             ha="right",
             va="top",
@@ -146,7 +146,7 @@ def draw_densities(
     axis.set_ylabel(shown.density_axis)
 
 
-def draw_limits(axis: Axes, x: FloatArray, at: xr.Dataset, look: dict[str, object]) -> None:
+def draw_limits(axis: Axes, x: FloatArray, at: xr.Dataset, look: Look) -> None:
     """Draw limits against something with their intervals.
 
     The line and hollow markers are the limits given that levitation holds, filled markers those of
@@ -165,11 +165,12 @@ def draw_limits(axis: Axes, x: FloatArray, at: xr.Dataset, look: dict[str, objec
     look
         Line style with ``color`` and ``marker``.
     """
+    unmarked: Look = {**look, "marker": ""}
     for name, hollow in (("held_limit", True), ("limit", False)):
         middle, low, high = (at[f"curve_{name}{end}"].to_numpy() for end in _ENDS)
         kept = np.isfinite(middle)
         if hollow:
-            axis.plot(x[kept], middle[kept], **{**look, "marker": ""})
+            axis.plot(x[kept], middle[kept], **unmarked)
         if not kept.any():
             continue
         reach = np.abs(np.stack([middle[kept] - low[kept], high[kept] - middle[kept]]))
@@ -206,5 +207,5 @@ def in_shown_unit(found: xr.Dataset, response: int) -> xr.Dataset:
 
 def differ(found: xr.Dataset) -> bool:
     """Whether any limit differs from that given that levitation holds."""
-    pair = (found[f"curve_{name}limit"].to_numpy() for name in ("", "held_"))
-    return not np.array_equal(*pair, equal_nan=True)
+    limit, held_limit = (found[f"curve_{name}limit"].to_numpy() for name in ("", "held_"))
+    return not np.array_equal(limit, held_limit, equal_nan=True)

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from maglev.errors import UserError
 from maglev.figures import curves, labels, style
 from maglev.vocabulary import RESPONSES
 
@@ -29,12 +30,12 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no baseline among them.
     """
     methods = [labels.method_of(one) for one in densities]
     if "mcm" not in methods:
-        raise ValueError("figure density_by_method: there is no baseline among the densities")
+        raise UserError("figure density_by_method: there is no baseline among the densities")
     found = curves.densities(densities)
     truth = methods.index("mcm")
     peak = found["curve_peak"]
@@ -42,7 +43,7 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
 
     fig = Figure(figsize=(style.PAGE, 2.9), layout="constrained")
     axis, table = fig.subplots(1, 2, width_ratios=[1.0, 1.05])
-    looks = [
+    looks: list[style.Look] = [
         {**labels.METHOD_STYLE[name], "label": labels.PDEM[name], "lw": 1.6 - 0.3 * (name != "mcm")}
         for name in methods
     ]
@@ -83,7 +84,7 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         table,
         rows,
         (0.0, 0.33, 0.46, 0.60, 0.75, 0.89),
-        [str(look["color"]) for look in looks],
+        [look["color"] for look in looks],
         0.155,
     )
     style.titled(table, "b", "peaks against the noise of MCM")

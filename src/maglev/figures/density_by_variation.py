@@ -35,7 +35,7 @@ def figure(
     found = curves.densities([densities[k] for k in order])
     found["curve_variation"] = ("curve", variations[order])
     colours = colormaps["viridis"](np.linspace(0.0, 0.88, order.size))
-    looks: list[dict[str, object]] = [
+    looks: list[style.Look] = [
         {"color": "#" + "".join(f"{round(255 * part):02x}" for part in colour[:3])}
         for colour in colours
     ]

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from maglev.errors import UserError
 from maglev.figures import curves, labels, style
 
 
@@ -26,12 +27,12 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no baseline among them.
     """
     methods = [labels.method_of(one) for one in densities]
     if "mcm" not in methods:
-        raise ValueError("figure exceedance_by_method: there is no baseline among the densities")
+        raise UserError("figure exceedance_by_method: there is no baseline among the densities")
     found = curves.densities(densities)
     truth = methods.index("mcm")
     n = int(found["curve_n_runs"][truth])
@@ -65,8 +66,8 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         axis.set_ylim(0.7 / n, 1.3)
         baseline = at.isel(curve=truth)
         held = (baseline["curve_exceedance"] - baseline["curve_lost_probability"]).to_numpy()
-        value = baseline["curve_value"].to_numpy()
-        inside = value[(held < 0.999 * held.max()) & (held > 1.5 / n)]
+        places = baseline["curve_value"].to_numpy()
+        inside = places[(held < 0.999 * held.max()) & (held > 1.5 / n)]
         margin = 0.05 * np.ptp(inside)
         axis.set_xlim(shown.scale * (inside.min() - margin), shown.scale * (inside.max() + margin))
         axis.locator_params(axis="x", nbins=5)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.figure import Figure
 
+from maglev.errors import UserError
 from maglev.figures import style
 
 _KINDS = (("suspension", 0), ("guidance", 1))
@@ -25,11 +26,11 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
 
     Raises
     ------
-    ValueError
+    UserError
         If there are no histories.
     """
     if "gap_history" not in data:
-        raise ValueError("figure gaps: the passage has no histories")
+        raise UserError("figure gaps: the passage has no histories")
     fig, axes = style.panels(2, 2, style.PAGE, 4.2)
     first = data.isel(sample=0)
     for column, (kind, code) in enumerate(_KINDS):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.figure import Figure
 
+from maglev.errors import UserError
 from maglev.figures import style
 from maglev.vocabulary import RESPONSES
 
@@ -33,12 +34,12 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
 
     Raises
     ------
-    ValueError
+    UserError
         If there are no histories.
     """
     names = [f"{name}_history" for name in RESPONSES]
     if any(name not in data for name in names):
-        raise ValueError("figure histories: the passage has no histories")
+        raise UserError("figure histories: the passage has no histories")
     fig, axes = style.panels(3, 2, style.PAGE, 5.4)
     first = data.isel(sample=0)
     for axis, response in zip(axes, RESPONSES, strict=True):

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass
+from typing import SupportsFloat, SupportsInt
 
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.typing import LineStyleType
 
+from maglev.errors import UserError
 from maglev.figures import style
 from maglev.vocabulary import GAINS, METHODS, RESPONSES
 
@@ -68,13 +71,15 @@ GAIN = ("suspension $k_p$", "suspension $k_d$", "guidance $k_p$", "guidance $k_d
 GAIN_COLOUR = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00")
 """Their colours: suspension blue, guidance orange."""
 
+_DASHES: tuple[LineStyleType, ...] = ("--", "-.", (0, (4, 1, 1, 1, 1, 1)), ":")
+
 METHOD = {"mcm": "MCM", "osm": "OSM", "asm_paper": "ASM (paper)", "asm": "ASM (ours)"}
 """The methods in short."""
 
 PDEM = {"mcm": "MCM", "osm": "OSM-PDEM", "asm_paper": "ASM-PDEM (paper)", "asm": "ASM-PDEM (ours)"}
 """The same for what is found with the density evolution."""
 
-METHOD_STYLE = {
+METHOD_STYLE: dict[str, style.Look] = {
     "mcm": {"color": "#000000", "ls": "-"},
     "osm": {"color": "#D55E00", "ls": "--"},
     "asm_paper": {"color": "#009E73", "ls": "-."},
@@ -91,12 +96,12 @@ def method_of(data: xr.Dataset) -> str:
 
     Raises
     ------
-    ValueError
+    UserError
         If the file does not say it.
     """
     name = data.attrs.get("method", "")
     if name not in METHODS:
-        raise ValueError(f"the file must say its method, one of {', '.join(METHODS)}, got '{name}'")
+        raise UserError(f"the file must say its method, one of {', '.join(METHODS)}, got '{name}'")
     return str(name)
 
 
@@ -110,14 +115,14 @@ def settings(design: xr.Dataset) -> tuple[float, int]:
 
     Raises
     ------
-    ValueError
+    UserError
         If the file does not say them.
     """
     try:
         of_case = json.loads(design.attrs["config"])["cases"][design.attrs["case"]]
         return float(of_case["coefficient_of_variation"]), int(of_case["n_spans"])
     except (KeyError, TypeError):
-        raise ValueError("the file must say its case and how it was configured") from None
+        raise UserError("the file must say its case and how it was configured") from None
 
 
 def confidence(data: xr.Dataset) -> str:
@@ -125,13 +130,13 @@ def confidence(data: xr.Dataset) -> str:
 
     Raises
     ------
-    ValueError
+    UserError
         If the file does not say it.
     """
     try:
         return f"{100 * json.loads(data.attrs['config'])['study']['confidence']:g} %"
     except (KeyError, TypeError):
-        raise ValueError("the file must say the confidence of its intervals") from None
+        raise UserError("the file must say the confidence of its intervals") from None
 
 
 def gains_of(data: xr.Dataset) -> list[int]:
@@ -139,12 +144,11 @@ def gains_of(data: xr.Dataset) -> list[int]:
     return [int(number) for number in data["parameter"].to_numpy()]
 
 
-def case_style(parameters: list[int]) -> tuple[str, dict[str, object]]:
+def case_style(parameters: list[int]) -> tuple[str, style.Look]:
     """Words and line for a case by its random gains."""
     if len(parameters) == 1:
         number = parameters[0]
-        dashes = ("--", "-.", (0, (4, 1, 1, 1, 1, 1)), ":")[number]
-        return f"{GAIN[number]} alone", {"color": GAIN_COLOUR[number], "ls": dashes}
+        return f"{GAIN[number]} alone", {"color": GAIN_COLOUR[number], "ls": _DASHES[number]}
     if len(parameters) == len(GAINS):
         return "all four gains", {"color": "#000000", "ls": "-"}
     return " and ".join(GAIN[number] for number in parameters), {"color": "#999999", "ls": "-"}
@@ -211,7 +215,7 @@ def response_panels(height: float) -> tuple[Figure, list[tuple[int, Axes, Shown]
     return figure, list(zip(range(len(SHOWN)), axes, SHOWN, strict=True))
 
 
-def of_runs(name: str, n_runs: float, lost_probability: float) -> str:
+def of_runs(name: str, n_runs: SupportsInt, lost_probability: SupportsFloat) -> str:
     """Words of a legend for a curve: what it is, from how many runs, and how many are lost."""
     return f"{name}, {int(n_runs)} runs, lost {percent(float(lost_probability))}"
 

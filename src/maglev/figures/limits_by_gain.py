@@ -32,7 +32,9 @@ def figure(
     """
     found = curves.limits(limits)
     levels = found["failure_probability"].to_numpy()
-    handles, words, looks = [], [], []
+    handles: list[Line2D] = []
+    words: list[str] = []
+    looks: list[style.Look] = []
     for one, design in zip(limits, designs, strict=True):
         parameters = labels.gains_of(design)
         name, look = labels.case_style(parameters)

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from maglev.figures import curves, labels, style
 
-_LOOKS: tuple[dict[str, object], ...] = (
+_LOOKS: tuple[style.Look, ...] = (
     {"color": "#0072B2", "ls": "-", "marker": "o"},
     {"color": "#D55E00", "ls": "--", "marker": "s"},
     {"color": "#000000", "ls": "-.", "marker": "^"},
@@ -55,10 +55,7 @@ def figure(
         axis.set_xticks(variation, [f"{one:.2f}" for one in variation])
         axis.set_xlabel("coefficient of variation [-]")
         axis.set_ylabel(f"limit, {shown.axis}")
-    handles = [
-        Line2D([], [], **_LOOKS[k % len(_LOOKS)], ms=3.5)  # type: ignore[arg-type]
-        for k in range(levels.size)
-    ]
+    handles = [Line2D([], [], **_LOOKS[k % len(_LOOKS)], ms=3.5) for k in range(levels.size)]
     words = [f"failure probability {level:g}" for level in levels]
     if curves.differ(found):
         handles.append(Line2D([], [], ls="", marker="o", ms=3.5, mfc="white", color=style.QUIET))

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from maglev.figures import labels, style
 from maglev.vocabulary import RESPONSES
@@ -44,8 +45,8 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         margin = 0.06 * (high - low)
         spans.append((low - margin, high + margin))
     size = len(RESPONSES)
-    fig = Figure(figsize=(style.PAGE, 6.8), layout="constrained")
-    fig.get_layout_engine().set(w_pad=0.02, h_pad=0.02, wspace=0.02, hspace=0.02)
+    layout = ConstrainedLayoutEngine(w_pad=0.02, h_pad=0.02, wspace=0.02, hspace=0.02)
+    fig = Figure(figsize=(style.PAGE, 6.8), layout=layout)
     axes = fig.subplots(size, size, sharex="col")
     drawn = None
     for row, column in np.ndindex(size, size):

@@ -31,7 +31,8 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         at = data.isel(response=response)
         for name, shift, filled in (("sobol_first", 0.2, True), ("sobol_total", -0.2, False)):
             middle = at[name].to_numpy()
-            reach = np.abs([middle - at[f"{name}_low"], at[f"{name}_high"] - middle])
+            low, high = (at[f"{name}_{end}"].to_numpy() for end in ("low", "high"))
+            reach = np.abs([middle - low, high - middle])
             axis.barh(
                 place + shift,
                 middle,

@@ -46,7 +46,7 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
     fig.colorbar(filled, ax=chart, label="growth rate [1/s]", shrink=0.9, format="%.2g")
     size = 1.2 if status.size > 2000 else 2.5
     held = status == 0
-    look = {"ms": size, "mew": 0, "color": "#0072B2", "alpha": 0.5, "rasterized": True}
+    look: style.Look = {"ms": size, "mew": 0, "color": "#0072B2", "alpha": 0.5, "rasterized": True}
     chart.plot(k_p[held], k_d[held], ".", **look)
     for code, marker in _MARKERS.items():
         chosen = status == code

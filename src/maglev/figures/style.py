@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypedDict
 
 import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.typing import LineStyleType, MarkerType
 
 COLUMN, PAGE = 3.5, 7.2
 """Widths of one column and of the page [inch]."""
@@ -19,6 +22,21 @@ MODEL, REFERENCE, MEASURED, ACCENT, QUIET = "#0072B2", "#D55E00", "#000000", "#0
 
 KMH = 3.6
 """Kilometres per hour in one metre per second."""
+
+
+class Look(TypedDict, total=False):
+    """Keywords of matplotlib for a line and its markers."""
+
+    color: str
+    ls: LineStyleType
+    lw: float
+    marker: MarkerType
+    ms: float
+    mew: float
+    mfc: str
+    alpha: float
+    rasterized: bool
+    label: str
 
 
 @contextmanager
@@ -55,8 +73,7 @@ def titled(axis: Axes, letter: str, text: str) -> None:
 
 def panels(rows: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
     """A figure [inch] of equal panels, lettered (a), (b) … from left to right."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.07)
+    figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.07))
     axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
     for letter, axis in zip("abcdefghijklmnop", axes, strict=False):
         axis.set_title(f"({letter})", loc="left")
@@ -114,8 +131,14 @@ def below(
     figure: Figure, handles: Sequence[Artist], words: Sequence[str], columns: int, title: str = ""
 ) -> None:
     """Put a legend in some columns under all panels, off the data."""
-    where = "outside lower center"
-    figure.legend(handles, words, loc=where, ncols=columns, title=title or None, title_fontsize=7)
+    figure.legend(
+        handles,
+        words,
+        loc="outside lower center",
+        ncols=columns,
+        title=title or None,
+        title_fontsize=7,
+    )
 
 
 def say_track(figure: Figure, words: str) -> None:

@@ -13,9 +13,9 @@ from maglev.figures import labels, style
 from maglev.vocabulary import GIVEN, LIMIT_STATUS
 
 _GIVEN = LIMIT_STATUS.index(GIVEN)
-_TRACK = {"ls": "", "marker": ".", "ms": 3.5, "color": "#7f7f7f", "mew": 0}
-_SEED = {"ls": "", "marker": "o", "ms": 3.5, "color": style.MODEL}
-_LINE = {"ls": "", "marker": "D", "ms": 4, "color": "#000000", "mfc": "white"}
+_TRACK: style.Look = {"ls": "", "marker": ".", "ms": 3.5, "color": "#7f7f7f", "mew": 0}
+_SEED: style.Look = {"ls": "", "marker": "o", "ms": 3.5, "color": style.MODEL}
+_LINE: style.Look = {"ls": "", "marker": "D", "ms": 4, "color": "#000000", "mfc": "white"}
 _APART = 0.28
 
 
@@ -58,7 +58,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     ]
     carried = bool((data["held_limit_of_line_status"] == _GIVEN).any())
     looks = (_TRACK, _SEED, _LINE) if carried else (_TRACK, _SEED)
-    handles = [Line2D([], [], **look) for look in looks]  # type: ignore[arg-type]
+    handles = [Line2D([], [], **look) for look in looks]
     title = f"limits given that levitation holds; intervals: {labels.confidence(data)}"
     if not carried:
         title += f"; {n} tracks carry none of the line"
@@ -73,7 +73,7 @@ def _with_interval(
     at: xr.Dataset,
     name: str,
     scale: float,
-    look: dict[str, object],
+    look: style.Look,
     track: int | None,
 ) -> None:
     """A limit with its interval; an arrow's place is left empty where there is no upper end."""
@@ -83,7 +83,7 @@ def _with_interval(
     reach = np.where(np.isfinite(reach), np.maximum(reach, 0.0), 0.0)
     axis.errorbar([x], [middle], yerr=reach, capsize=1.5, elinewidth=0.8, zorder=3, **look)
     if np.isinf(high):
-        arrow = {"arrowstyle": "<-", "color": str(look["color"]), "lw": 0.7, "shrinkA": 0}
+        arrow = {"arrowstyle": "<-", "color": look["color"], "lw": 0.7, "shrinkA": 0}
         axis.annotate(
             "", xy=(x, middle), xytext=(0, 13), textcoords="offset points", arrowprops=arrow
         )

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from maglev.figures import labels, style
 
-_PARTS = {
+_PARTS: dict[str, tuple[str, style.Look]] = {
     "density_both": ("gains and track random", {"color": "#000000", "ls": "-"}),
     "density_track_only": ("track random, mean gains", {"color": "#D55E00", "ls": "--"}),
     "density_gains_only": ("gains random, one track", {"color": "#0072B2", "ls": "-."}),

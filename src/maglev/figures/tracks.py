@@ -8,9 +8,9 @@ from matplotlib.lines import Line2D
 
 from maglev.figures import labels, style
 
-_TRACK = {"color": "#7f7f7f", "lw": 0.5, "alpha": 0.7}
-_SEED = {"color": style.MODEL, "lw": 1.1}
-_LINE = {"color": "#000000", "lw": 1.4}
+_TRACK: style.Look = {"color": "#7f7f7f", "lw": 0.5, "alpha": 0.7}
+_SEED: style.Look = {"color": style.MODEL, "lw": 1.1}
+_LINE: style.Look = {"color": "#000000", "lw": 1.4}
 
 
 def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
@@ -49,7 +49,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         axis.set_ylim(0, 1.5 * line.max())
         axis.locator_params(axis="x", nbins=5)
         axis.set(xlabel=shown.axis, ylabel=shown.density_axis)
-    handles = [Line2D([], [], **look) for look in (_LINE, _TRACK, _SEED)]  # type: ignore[arg-type]
+    handles = [Line2D([], [], **look) for look in (_LINE, _TRACK, _SEED)]
     words = [
         f"the line: gains and track random, {n} tracks",
         f"each track, over {n}",

@@ -38,18 +38,24 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     for part, (colour, marker) in _LOOK.items():
         chosen = of_body if part == "car_body" else moves == part
         word = f"{part.replace('_', ' ')} ({chosen.sum()})"
-        look = {"ls": "", "marker": marker, "ms": 4, "mfc": "none", "color": colour}
+        look: style.Look = {"ls": "", "marker": marker, "ms": 4, "mfc": "none", "color": colour}
         axis.plot(frequency[chosen], ratio[chosen], **look, label=word)
     named = np.flatnonzero(of_body)
     for number, k in enumerate(named, start=1):
-        place = {"xytext": (-9, -2.5) if number % 2 else (4.5, -2.5), "textcoords": "offset points"}
-        axis.annotate(str(number), (frequency[k], ratio[k]), **place, fontsize=7)
+        place = (-9, -2.5) if number % 2 else (4.5, -2.5)
+        axis.annotate(
+            str(number),
+            (frequency[k], ratio[k]),
+            xytext=place,
+            textcoords="offset points",
+            fontsize=7,
+        )
     axis.set(xscale="log", xlabel="frequency [Hz]", ylabel="damping [% of critical]")
     axis.set_ylim(min(0.0, 1.1 * ratio.min()), None)
     axis.set_title(f"(a) {frequency.size} modes of one car", loc="left")
     style.below(fig, *axis.get_legend_handles_labels(), 5)
 
-    rows = [("", "what moves", "frequency", "damping", "share")]
+    rows: list[tuple[str, ...]] = [("", "what moves", "frequency", "damping", "share")]
     colours = [style.MODEL] * named.size
     largest = 100 * data["kinetic_share"].max("train_part").to_numpy()
     for number, k in enumerate(named, start=1):

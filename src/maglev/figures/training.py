@@ -60,7 +60,7 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
         upper, lower = axes[column], axes[2 + column]
         for (n_runs, rmse, error), design in zip(rows, designs, strict=True):
             method = labels.method_of(design)
-            look = {
+            look: style.Look = {
                 **labels.METHOD_STYLE[method],
                 "marker": labels.METHOD_MARKER[method],
                 "ms": 2.5,
@@ -105,6 +105,7 @@ def _rounds(accuracy: xr.Dataset, design: xr.Dataset) -> tuple[np.ndarray, np.nd
     row = accuracy["method"].to_numpy().tolist().index(METHODS.index(labels.method_of(design)))
     known = accuracy["step_n_runs"].to_numpy()[row] > 0
     of_method = accuracy.isel(method=row)
-    return tuple(  # type: ignore[return-value]
+    n_runs, rmse, error = (
         of_method[name].to_numpy()[known] for name in ("step_n_runs", "step_rmse", "step_error")
     )
+    return n_runs, rmse, error

@@ -31,9 +31,9 @@ def at_rest(n_dof):
 
 
 @kernel()
-def _straight_rails(line):
+def _straight_rails(spans):
     """Room for the motion of all rails and the forces on them."""
-    n = line.n_spans * line.stride
+    n = spans.n_spans * spans.stride
     shape = (3, n, LANES)
     return Rails(
         zeros(3 * n).reshape(shape), zeros(3 * n).reshape(shape), zeros(3 * n).reshape(shape)
@@ -92,53 +92,53 @@ def _links(vehicle, train, scaled, pull):
 
 
 @kernel()
-def _move_span(line, span, begin, end, source, packed, motion):
+def _move_span(spans, span, begin, end, source, packed, motion):
     """Motion (or its rate) of a span's rails from the relative motion of the coordinates."""
-    at = span * line.stride
-    up, up_end = line.upright_start[span], line.upright_start[span + 1]
-    out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
-    gather(source, line.upright, up, up_end, packed, 0)
-    gather(source, line.sideways, out, out_end, packed, up_end - up)
+    at = span * spans.stride
+    up, up_end = spans.upright_start[span], spans.upright_start[span + 1]
+    out, out_end = spans.sideways_start[span], spans.sideways_start[span + 1]
+    gather(source, spans.upright, up, up_end, packed, 0)
+    gather(source, spans.sideways, out, out_end, packed, up_end - up)
     transform_both(
-        line.rail_z, up, up_end, line.rail_roll, out, out_end, packed, begin, end,
+        spans.rail_z, up, up_end, spans.rail_roll, out, out_end, packed, begin, end,
         motion[0], motion[1], at,
     )  # fmt: skip
-    transform(line.rail_y, out, out_end, packed, up_end - up, begin, end, motion[2], at)
+    transform(spans.rail_y, out, out_end, packed, up_end - up, begin, end, motion[2], at)
 
 
 @kernel()
-def _move_rails(line, first, last, tail, nose, guideway, packed, rails):
+def _move_rails(spans, first, last, tail, nose, guideway, packed, rails):
     """Motion and rate of the rails under the train; no force on them yet."""
     for span in range(first, last + 1):
-        begin, end = _covered(line, span, tail, nose)
-        _move_span(line, span, begin, end, guideway.position, packed, rails.motion)
-        _move_span(line, span, begin, end, guideway.predicted, packed, rails.rate)
-        at = span * line.stride
+        begin, end = _covered(spans, span, tail, nose)
+        _move_span(spans, span, begin, end, guideway.position, packed, rails.motion)
+        _move_span(spans, span, begin, end, guideway.predicted, packed, rails.rate)
+        at = span * spans.stride
         for field in range(3):
             for k in range(begin, end):
                 store(rails.force[field], at + k, 0.0)
 
 
 @kernel()
-def _load_span(line, span, begin, end, rails, turn, force):
+def _load_span(spans, span, begin, end, rails, turn, force):
     """Add the forces on a span's rails to the coordinates that move them.
 
     Leaves the sum of right and left in ``rails.force[0]`` and the difference in ``turn``.
     """
-    at = span * line.stride
-    up, up_end = line.upright_start[span], line.upright_start[span + 1]
-    out, out_end = line.sideways_start[span], line.sideways_start[span + 1]
+    at = span * spans.stride
+    up, up_end = spans.upright_start[span], spans.upright_start[span + 1]
+    out, out_end = spans.sideways_start[span], spans.sideways_start[span + 1]
     for k in range(begin, end):
         right, left = load(rails.force[0], at + k), load(rails.force[1], at + k)
         store(rails.force[0], at + k, right + left)
         store(turn, k, right - left)
-    project(line.rail_z, line.upright, up, up_end, begin, end, rails.force[0], at, force)
-    project(line.rail_roll, line.sideways, out, out_end, begin, end, turn, 0, force)
-    project(line.rail_y, line.sideways, out, out_end, begin, end, rails.force[2], at, force)
+    project(spans.rail_z, spans.upright, up, up_end, begin, end, rails.force[0], at, force)
+    project(spans.rail_roll, spans.sideways, out, out_end, begin, end, turn, 0, force)
+    project(spans.rail_y, spans.sideways, out, out_end, begin, end, rails.force[2], at, force)
 
 
 @kernel()
-def _load_guideway(line, first, last, tail, nose, rails, turn, guideway):
+def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway):
     """Put the forces on the rails under the train on the guideway.
 
     Returns the motion of midspan, z and y, that modes left out have under them.
@@ -146,32 +146,32 @@ def _load_guideway(line, first, last, tail, nose, rails, turn, guideway):
     rest_z = load(guideway.position, 0) * 0.0
     rest_y = rest_z
     for span in range(first, last + 1):
-        begin, end = _covered(line, span, tail, nose)
-        _load_span(line, span, begin, end, rails, turn, guideway.force)
-        if span == line.middle:
-            at = span * line.stride
+        begin, end = _covered(spans, span, tail, nose)
+        _load_span(spans, span, begin, end, rails, turn, guideway.force)
+        if span == spans.middle:
+            at = span * spans.stride
             for k in range(begin, end):
-                rest_z = fma(load(rails.force[0], at + k), line.rest[0, k], rest_z)
-                rest_y = fma(load(turn, k), line.rest[1, k], rest_y)
-                rest_y = fma(load(rails.force[2], at + k), line.rest[2, k], rest_y)
+                rest_z = fma(load(rails.force[0], at + k), spans.rest[0, k], rest_z)
+                rest_y = fma(load(turn, k), spans.rest[1, k], rest_y)
+                rest_y = fma(load(rails.force[2], at + k), spans.rest[2, k], rest_y)
     return rest_z, rest_y
 
 
 @kernel()
-def _still(stages, stage, guideway):
+def _still(stretches, stretch, guideway):
     """Leave the coordinates alone that are no longer stepped: modes at rest."""
-    for k in range(stages.stilled_start[stage], stages.stilled_start[stage + 1]):
-        i = stages.stilled[k]
+    for k in range(stretches.stilled_start[stretch], stretches.stilled_start[stretch + 1]):
+        i = stretches.stilled[k]
         for state in guideway:
             store(state, i, 0.0)
 
 
 @kernel()
-def _advance_guideway(stages, stage, dt, guideway):
+def _advance_guideway(stretches, stretch, dt, guideway):
     """As `_advance_train` for what is stepped of the guideway; leaves no accelerations."""
     half = 0.5 * dt
-    for n in range(stages.start[stage], stages.start[stage + 1]):
-        i = entry(stages.stepped, n)
+    for n in range(stretches.start[stretch], stretches.start[stretch + 1]):
+        i = entry(stretches.stepped, n)
         a = load(guideway.force, i)
         v = fma(a, dt, load(guideway.velocity, i))
         store(guideway.position, i, fma(v, dt, load(guideway.position, i)))
@@ -182,25 +182,29 @@ def _advance_guideway(stages, stage, dt, guideway):
 
 
 @kernel()
-def _answer(line, stage, guideway):
+def _answer(spans, stretch, guideway):
     """Turn the forces on the coordinates that are stepped into accelerations, in place."""
     x, velocity, force = guideway.position, guideway.predicted, guideway.force
-    n_modes, stages = line.square.size, line.stages
-    start, tops, stop = stages.start[stage], stages.tops[stage], stages.start[stage + 1]
+    n_modes, stretches = spans.square.size, spans.stretches
+    start, tops, stop = (
+        stretches.start[stretch],
+        stretches.tops[stretch],
+        stretches.start[stretch + 1],
+    )
     none = load(force, 0) * 0.0
-    damping, column = line.damping, line.damping_column
+    damping, column = spans.damping, spans.damping_column
     for n in range(start, stop):
-        i = entry(stages.stepped, n)
+        i = entry(stretches.stepped, n)
         if n < tops:
-            back = load(x, i) * entry(line.square, i)
+            back = load(x, i) * entry(spans.square, i)
         else:  # modes come first
-            first, last = entry(stages.taken_from, n), entry(stages.taken_to, n)
-            back = weighted_sum(line.taken, line.taken_mode, first, last, force, none)
-            first = entry(line.stiffness_start, i - n_modes)
-            last = entry(line.stiffness_start, i - n_modes + 1)
-            back = weighted_sum(line.stiffness, line.stiffness_top, first, last, x, back)
+            first, last = entry(stretches.taken_from, n), entry(stretches.taken_to, n)
+            back = weighted_sum(spans.taken, spans.taken_mode, first, last, force, none)
+            first = entry(spans.stiffness_start, i - n_modes)
+            last = entry(spans.stiffness_start, i - n_modes + 1)
+            back = weighted_sum(spans.stiffness, spans.stiffness_top, first, last, x, back)
         drag = none
-        first, last = entry(stages.damping_from, n), entry(stages.damping_to, n)
+        first, last = entry(stretches.damping_from, n), entry(stretches.damping_to, n)
         for k in range(first, last - 1, 2):  # two sums: neither waits for the other
             drag = fma(load(velocity, entry(column, k)), entry(damping, k), drag)
             back = fma(load(velocity, entry(column, k + 1)), entry(damping, k + 1), back)
@@ -208,36 +212,36 @@ def _answer(line, stage, guideway):
             drag = fma(load(velocity, entry(column, last - 1)), entry(damping, last - 1), drag)
         store(force, i, load(force, i) - (back + drag))
     for n in range(tops, stop):
-        i = entry(stages.stepped, n)
-        first, last = entry(stages.factor_start, n), entry(stages.factor_start, n + 1)
+        i = entry(stretches.stepped, n)
+        first, last = entry(stretches.factor_start, n), entry(stretches.factor_start, n + 1)
         total = load(force, i) - weighted_sum(
-            stages.factor, stages.factor_top, first, last, force, none
+            stretches.factor, stretches.factor_top, first, last, force, none
         )
-        store(force, i, total * entry(stages.factor_inverse, n))
+        store(force, i, total * entry(stretches.factor_inverse, n))
     for n in range(stop - 1, tops - 1, -1):
-        i = entry(stages.stepped, n)
-        total = load(force, i) * entry(stages.factor_inverse, n)
+        i = entry(stretches.stepped, n)
+        total = load(force, i) * entry(stretches.factor_inverse, n)
         store(force, i, total)
-        for k in range(entry(stages.factor_start, n), entry(stages.factor_start, n + 1)):
-            at = entry(stages.factor_top, k)
-            store(force, at, load(force, at) - total * entry(stages.factor, k))
+        for k in range(entry(stretches.factor_start, n), entry(stretches.factor_start, n + 1)):
+            at = entry(stretches.factor_top, k)
+            store(force, at, load(force, at) - total * entry(stretches.factor, k))
     for n in range(start, tops):
-        i = entry(stages.stepped, n)
-        first, last = entry(line.carried_start, i), entry(line.carried_start, i + 1)
-        along = weighted_sum(line.carried, line.carried_top, first, last, force, none)
-        store(force, i, (load(force, i) - along) * entry(line.response, i))
+        i = entry(stretches.stepped, n)
+        first, last = entry(spans.carried_start, i), entry(spans.carried_start, i + 1)
+        along = weighted_sum(spans.carried, spans.carried_top, first, last, force, none)
+        store(force, i, (load(force, i) - along) * entry(spans.response, i))
 
 
 @kernel()
-def _covered(line, span, tail, nose):
+def _covered(spans, span, tail, nose):
     """Rows of a span's rail coefficients, from and to, of the units that the train is on."""
-    per_unit = line.stride // line.n_units
-    unit = line.span_length / line.n_units
-    start = span * line.span_length
+    per_unit = spans.stride // spans.n_units
+    unit = spans.span_length / spans.n_units
+    start = span * spans.span_length
     # A pole may stand a rounding error beyond the ends of the train.
     begin = int(np.floor((tail - start) / unit - 1.0e-6))
     end = int(np.floor((nose - start) / unit + 1.0e-6)) + 1
-    return max(0, begin) * per_unit, min(line.n_units, end) * per_unit
+    return max(0, begin) * per_unit, min(spans.n_units, end) * per_unit
 
 
 @kernel()
@@ -283,7 +287,7 @@ def _low_pass(sections, direction, watch, incoming):
 
 
 @kernel()
-def _watch_midspan(line, run, step, direction, rest, guideway, watch, outcome):
+def _watch_midspan(spans, run, step, direction, rest, guideway, watch, outcome):
     """Displacement of midspan, and its acceleration a step late.
 
     What left-out modes add follows the forces at once; its acceleration, a second difference, is
@@ -292,10 +296,10 @@ def _watch_midspan(line, run, step, direction, rest, guideway, watch, outcome):
     dt = run.time_step
     shift = rest * 0.0
     raw = shift
-    n_columns = line.output_column.size
+    n_columns = spans.output_column.size
     for k in range(n_columns):
-        column = entry(line.output_column, k)
-        share = entry(line.midspan, direction * n_columns + k)
+        column = entry(spans.output_column, k)
+        share = entry(spans.midspan, direction * n_columns + k)
         shift = fma(load(guideway.position, column), share, shift)
         raw = fma(load(guideway.force, column), share, raw)
     change = rest - load(watch.left_out, 3 * direction)
@@ -388,7 +392,7 @@ def _all_lost(run, watch, outcome, time):
 @kernel(nogil=True)
 def passage(
     vehicle, suspension, guidance, suspension_law, guidance_law, suspension_places,
-    guidance_places, line, run, gains, outcome,
+    guidance_places, spans, run, gains, outcome,
 ):  # fmt: skip
     """Take one row of samples over the guideway.
 
@@ -398,7 +402,7 @@ def passage(
     ----------
     vehicle, suspension, guidance, suspension_law, guidance_law
         The train, its magnets and their circuits.
-    suspension_places, guidance_places, line, run
+    suspension_places, guidance_places, spans, run
         What the poles meet, the guideway and the passage.
     gains : (8, LANES)
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d, suspension k_a [A s²/m],
@@ -407,31 +411,31 @@ def passage(
         Receives the results; extremes start at zero, gaps at the reference.
     """
     n_cars, n_magnets = vehicle.body_z.size, 2 * (suspension.x.size + guidance.x.size)
-    dt, stages = run.time_step, line.stages
+    dt, stretches = run.time_step, spans.stretches
     train = at_rest(vehicle.inverse_mass.size)
-    guideway = at_rest(line.square.size + line.stiffness_start.size - 1)
-    rails = _straight_rails(line)
+    guideway = at_rest(spans.square.size + spans.stiffness_start.size - 1)
+    rails = _straight_rails(spans)
     scaled, pull = zeros(vehicle.scaled_dof.size), zeros(vehicle.link_start.size - 1)
-    packed, turn = zeros(line.upright.size + line.sideways.size), zeros(line.stride)
+    packed, turn = zeros(spans.upright.size + spans.sideways.size), zeros(spans.stride)
     lifting = empty_magnet(suspension, suspension_law)
     guiding = empty_magnet(guidance, guidance_law)
     lifting_circuits = circuits_at_rest(suspension, suspension_law)
     guiding_circuits = circuits_at_rest(guidance, guidance_law)
     watch = _new_watch(n_magnets, run.sections.shape[0], outcome.extreme.shape[0])
-    stage = -1
+    stretch = -1
     for step in range(run.first_step, run.n_steps + 1):
         nose = run.start + run.speed * (step * dt)
         tail = nose - run.train_length
-        first = max(0, int(np.floor(tail / line.span_length)))
-        last = min(line.n_spans - 1, int(np.floor(nose / line.span_length)))
+        first = max(0, int(np.floor(tail / spans.span_length)))
+        last = min(spans.n_spans - 1, int(np.floor(nose / spans.span_length)))
         record = run.record_every > 0 and step % run.record_every == 0
         _advance_train(vehicle, dt, train)
-        while stage + 1 < stages.first_step.size and step >= stages.first_step[stage + 1]:
-            stage += 1
-            _still(stages, stage, guideway)
-        if stage >= 0:
-            _advance_guideway(stages, stage, dt, guideway)
-        _move_rails(line, first, last, tail, nose, guideway, packed, rails)
+        while stretch + 1 < stretches.first_step.size and step >= stretches.first_step[stretch + 1]:
+            stretch += 1
+            _still(stretches, stretch, guideway)
+        if stretch >= 0:
+            _advance_guideway(stretches, stretch, dt, guideway)
+        _move_rails(spans, first, last, tail, nose, guideway, packed, rails)
         _links(vehicle, train, scaled, pull)
         attract(
             suspension_places, suspension, suspension_law, step, dt, gains, train, rails, lifting,
@@ -441,11 +445,11 @@ def passage(
             guidance_places, guidance, guidance_law, step, dt, gains, train, rails, guiding,
             guiding_circuits, record, watch, outcome,
         )  # fmt: skip
-        rest_z, rest_y = _load_guideway(line, first, last, tail, nose, rails, turn, guideway)
-        if stage >= 0:
-            _answer(line, stage, guideway)
-        _watch_midspan(line, run, step, 0, rest_z, guideway, watch, outcome)
-        _watch_midspan(line, run, step, 1, rest_y, guideway, watch, outcome)
+        rest_z, rest_y = _load_guideway(spans, first, last, tail, nose, rails, turn, guideway)
+        if stretch >= 0:
+            _answer(spans, stretch, guideway)
+        _watch_midspan(spans, run, step, 0, rest_z, guideway, watch, outcome)
+        _watch_midspan(spans, run, step, 1, rest_y, guideway, watch, outcome)
         _watch_cars(vehicle, run, step, train, watch, outcome)
         if record:
             _record_magnets(run, step, n_cars, watch, outcome)

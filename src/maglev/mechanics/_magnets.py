@@ -84,6 +84,10 @@ def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
     at_rest = none + rows.current_reference
     first = (2 * row + side) * law.n_circuits
     n = circuits.signal.shape[1]
+    last, now = ((step - 1) % law.ring) * n + first, (step % law.ring) * n + first
+    latest = ((step - law.behind + law.ring) % law.ring) * n + first
+    middle = ((step - law.behind - 1 + law.ring) % law.ring) * n + first
+    oldest = ((step - law.behind - 2 + law.ring) % law.ring) * n + first
     for c in range(law.n_circuits):
         if law.own_gap:
             error, rate = load(magnet.error, c), load(magnet.rate, c)
@@ -110,15 +114,17 @@ def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
                 acceleration = fma(turn, entry(law.arm, c), shift)
                 fast = load(gains, 4 + 2 * kind) * sign * acceleration
             if law.delays:
-                # the acceleration of the step before is known only now
-                last = ((step - 1) % law.ring) * n + here
-                store(circuits.signal, last, load(circuits.signal, last) + fast)
-                store(circuits.signal, (step % law.ring) * n + here, signal)
+                if law.accelerates:  # that of the step before is known only now
+                    known = load(circuits.signal, last + c) + fast
+                    store(circuits.signal, last + c, known)
+                store(circuits.signal, now + c, signal)
                 signal = fast * law.undelayed
-                for j in range(3):
-                    slot = (step - law.behind - j + law.ring) % law.ring
-                    past = load(circuits.signal, slot * n + here)
-                    signal = fma(past, entry(law.delayed, j), signal)
+                past = load(circuits.signal, latest + c)
+                signal = fma(past, entry(law.delayed, 0), signal)
+                past = load(circuits.signal, middle + c)
+                signal = fma(past, entry(law.delayed, 1), signal)
+                past = load(circuits.signal, oldest + c)
+                signal = fma(past, entry(law.delayed, 2), signal)
             else:
                 signal = signal + fast
             command = at_rest + signal

@@ -130,33 +130,33 @@ class Watch(NamedTuple):
     magnet_current: np.ndarray  # (magnet, LANES) [A]
 
 
-class Stages(NamedTuple):
-    """What is stepped of the guideway when: stages of a passage, and the rows that they step with.
+class Stretches(NamedTuple):
+    """What is stepped of the guideway when: stretches of a passage, and the rows they step with.
 
-    Before the first stage the guideway rests.
+    Before the first stretch the guideway rests.
     """
 
-    first_step: np.ndarray  # (stage,) number of a step
-    start: np.ndarray  # (stage + 1,) into ``stepped``
-    tops: np.ndarray  # (stage,) where in ``stepped`` pier tops follow modes
-    stepped: np.ndarray  # coordinates that are stepped, of all stages
-    damping_from: np.ndarray  # (stepped,) row of the line's ``damping``
+    first_step: np.ndarray  # (stretch,) number of a step
+    start: np.ndarray  # (stretch + 1,) into ``stepped``
+    tops: np.ndarray  # (stretch,) where in ``stepped`` pier tops follow modes
+    stepped: np.ndarray  # coordinates that are stepped, of all stretches
+    damping_from: np.ndarray  # (stepped,) row of `Spans.damping`
     damping_to: np.ndarray
-    taken_from: np.ndarray  # (stepped,) row of the line's ``taken``
+    taken_from: np.ndarray  # (stepped,) row of `Spans.taken`
     taken_to: np.ndarray
     factor_start: np.ndarray  # (stepped + 1,) Cholesky rows of the mass of stepped pier tops
     factor_top: np.ndarray  # coordinate
     factor: np.ndarray
     factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal
-    stilled_start: np.ndarray  # (stage + 1,) coordinates that the stage before stepped
+    stilled_start: np.ndarray  # (stretch + 1,) coordinates that the stretch before stepped
     stilled: np.ndarray
 
 
-class Line(NamedTuple):
+class Spans(NamedTuple):
     """Guideway in component coordinates: modes of spans, modes of piers, pier tops.
 
     A mode counts from where the pier tops would take it if it were rigid.  While the train is where
-    it is, only the coordinates of a stage are stepped; the other modes follow the pier tops.
+    it is, only the coordinates of a stretch are stepped; the other modes follow the pier tops.
     """
 
     n_spans: int
@@ -175,14 +175,14 @@ class Line(NamedTuple):
     carried_start: np.ndarray  # (mode + 1,) what modes take along of the pier tops' motion
     carried_top: np.ndarray  # coordinate
     carried: np.ndarray
-    damping_column: np.ndarray  # coordinate, in rows that the stages name
+    damping_column: np.ndarray  # coordinate, in rows that the stretches name
     damping: np.ndarray
-    taken_mode: np.ndarray  # the same as carried by pier tops, in rows that the stages name
+    taken_mode: np.ndarray  # the same as carried by pier tops, in rows that the stretches name
     taken: np.ndarray
     stiffness_start: np.ndarray  # (top + 1,) between pier tops
     stiffness_top: np.ndarray  # coordinate
     stiffness: np.ndarray
-    stages: Stages
+    stretches: Stretches
     output_column: np.ndarray  # (output column,) coordinates that move midspan
     midspan: np.ndarray  # (2, output column) z and y
     middle: int  # span that midspan is of

@@ -2,7 +2,7 @@
 
 Spans under the train and their neighbours are awake: all of their coordinates are stepped, as are
 those of the middle span, which is watched.  Other spans are quiet.  Piers pass motion on along the
-line, so that quiet spans do not rest: their pier tops and low modes are stepped, and their other
+guideway, so that quiet spans do not rest: their pier tops and low modes are stepped; their other
 modes follow the pier tops without a motion of their own.  Damping between a mode that a quiet span
 keeps and one that its neighbour alone steps acts on the latter only.
 """
@@ -16,7 +16,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from maglev.mechanics.course import n_steps, nose, time_step
+from maglev.mechanics.course import course
 from maglev.mechanics.reduction import ReducedGuideway
 from maglev.parameters import Config
 
@@ -33,7 +33,7 @@ AWAKE_BESIDE = 3
 
 
 @dataclass(frozen=True)
-class Stage:
+class Stretch:
     """A stretch of steps in which the same coordinates are stepped.
 
     Attributes
@@ -51,7 +51,7 @@ class Stage:
     stepped: BoolArray
 
 
-def stages(config: Config, reduced: ReducedGuideway) -> list[Stage]:
+def stretches(config: Config, reduced: ReducedGuideway) -> list[Stretch]:
     """Divide the steps of a passage, from that on which the nose reaches the guideway.
 
     Parameters
@@ -63,12 +63,13 @@ def stages(config: Config, reduced: ReducedGuideway) -> list[Stage]:
 
     Returns
     -------
-    stages
+    stretches
         In order; what is awake or stepped differs from each to the next.
     """
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
-    step = np.arange(1, n_steps(config) + 1)
-    at = nose(config, step * time_step(config))
+    way = course(config)
+    step = np.arange(1, way.n_steps + 1)
+    at = way.nose(step * way.time_step)
     step, at = step[at >= 0], at[at >= 0]
     ahead = np.minimum(np.floor(at / length).astype(int) + AWAKE_BESIDE, n_spans - 1)
     behind = np.floor((at - config.train.length) / length).astype(int) - AWAKE_BESIDE
@@ -83,7 +84,7 @@ def stages(config: Config, reduced: ReducedGuideway) -> list[Stage]:
         spans[n_spans // 2] = True
         piers = np.concatenate([spans, [False]]) | np.concatenate([[False], spans])
         awake = np.where(of_span >= 0, spans[of_span], piers[of_pier])
-        found.append(Stage(int(step[k]), awake, awake | quiet))
+        found.append(Stretch(int(step[k]), awake, awake | quiet))
     return found
 
 

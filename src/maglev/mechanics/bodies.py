@@ -49,6 +49,10 @@ class Body:
         """
         return _combination((self.z, 1.0), (self.phi, dy), (self.theta, -dx))
 
+    def roll(self) -> Motion:
+        """Rotation about x of every place on it."""
+        return _combination((self.phi, 1.0))
+
 
 @dataclass(frozen=True)
 class Link:

@@ -167,13 +167,12 @@ def add_car(
         The bodies that neighbouring cars and the reported responses refer to.
     """
     p = train.car_body
-    body = Body(
-        y=assembly.add_dof(f"{name}.body.y", p.mass),
-        z=assembly.add_dof(f"{name}.body.z", p.mass, p.mass * GRAVITY),
-        phi=assembly.add_dof(f"{name}.body.phi", p.roll_inertia),
-        theta=assembly.add_dof(f"{name}.body.theta", p.pitch_inertia),
-        psi=assembly.add_dof(f"{name}.body.psi", p.yaw_inertia),
-    )
+    y = assembly.add_dof(f"{name}.body.y", p.mass)
+    z = assembly.add_dof(f"{name}.body.z", p.mass, p.mass * GRAVITY)
+    phi = assembly.add_dof(f"{name}.body.phi", p.roll_inertia)
+    theta = assembly.add_dof(f"{name}.body.theta", p.pitch_inertia)
+    psi = assembly.add_dof(f"{name}.body.psi", p.yaw_inertia)
+    body = Body(y=y, z=z, phi=phi, theta=theta, psi=psi)
     c_frames = [
         c_frame
         for bogie in range(N_BOGIES)
@@ -197,7 +196,7 @@ def add_car(
         for side in (RIGHT, LEFT)
         for station in range(N_C_FRAMES - 1)
     ]
-    body_dof = (body.y, body.z, body.phi, body.theta, body.psi)
+    body_dof = (y, z, phi, theta, psi)
     return Car(body_dof=body_dof, c_frames=tuple(c_frames), magnets=tuple(magnets))
 
 
@@ -365,9 +364,7 @@ def _add_support(
     share = train.car_body.mass * GRAVITY / (2 * N_C_FRAMES)
     assembly.links.append(Link(relative(rod_end, body_place), rod.end_stiffness, rod.end_damping))
     assembly.links.append(Link({phi: 1.0}, share * rod.length, 0.0))
-    assembly.links.append(
-        Link(relative({phi: 1.0}, {c_frame.body.phi: 1.0}), 0.0, rod.pivot_damping)
-    )
+    assembly.links.append(Link(relative({phi: 1.0}, c_frame.body.roll()), 0.0, rod.pivot_damping))
 
 
 def _side_name(side: int) -> str:

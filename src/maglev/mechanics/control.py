@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from maglev.errors import UserError
 from maglev.parameters import Circuit
 
 Array = npt.NDArray[np.float64]
@@ -57,7 +58,7 @@ def grouping(group: str, n_poles: int) -> Grouping:
 
     Raises
     ------
-    ValueError
+    UserError
         If the group is unknown.
 
     Examples
@@ -73,7 +74,7 @@ def grouping(group: str, n_poles: int) -> Grouping:
         mean = np.full((1, n_poles), 1.0 / n_poles)
         return Grouping(mean, np.ones((n_poles, 1)), mean_gap_force=True)
     if group not in ("ends", "half"):
-        raise ValueError(f"group must be 'pole', 'ends', 'half' or 'lumped', got {group!r}")
+        raise UserError(f"group must be 'pole', 'ends', 'half' or 'lumped', got {group!r}")
     place = np.arange(n_poles) - 0.5 * (n_poles - 1)
     front = np.where(place < 0, 1.0, np.where(place > 0, 0.0, 0.5))
     drive = np.column_stack([front, 1.0 - front])

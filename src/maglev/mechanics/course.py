@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from maglev.arrays import FloatArray
 from maglev.parameters import Config, Magnet
 
 JOINT_SHARE = 0.5
@@ -14,8 +16,49 @@ JOINT_SHARE = 0.5
 error of first order unless it falls half-way between two steps (docs/theory/integration.md)."""
 
 
-def time_step(config: Config) -> float:
-    """Step of the time integration [s]: the largest that fits the pole passing.
+@dataclass(frozen=True)
+class Course:
+    """The run of a train from start to end, in steps.
+
+    Attributes
+    ----------
+    time_step
+        Δt [s].
+    speed
+        Of the train [m/s].
+    start
+        Place of the nose at time zero [m], the first pier at zero.
+    n_steps
+        Steps until the tail has left the last span [-].
+    first_step
+        Number of the first step on which anything moves [-].  Until the nose reaches the
+        irregularity, or without one the guideway, the train rests in its equilibrium over rigid
+        straight track: nothing need be computed.
+    """
+
+    time_step: float
+    speed: float
+    start: float
+    n_steps: int
+    first_step: int
+
+    @property
+    def advance(self) -> float:
+        """Way of the train in a step [m]."""
+        return self.speed * self.time_step
+
+    @property
+    def duration(self) -> float:
+        """Time from start to end [s]."""
+        return self.n_steps * self.time_step
+
+    def nose(self, time: npt.ArrayLike) -> FloatArray:
+        """Place of the nose after given times [m], the first pier at zero."""
+        return self.start + self.speed * np.asarray(time)
+
+
+def course(config: Config) -> Course:
+    """The run of a configuration, in steps that fit the pole passing.
 
     A pole enters each span with a kink in its force, and poles follow one another at the rate
     v / pole pitch.  A step that divides this period keeps all harmonics of pole passing where they
@@ -23,15 +66,41 @@ def time_step(config: Config) -> float:
     magnets, which stand half a pitch apart, are to meet the joints at the same share of a step:
     then the step divides the period an even number of times.
 
+    The train starts less than a step before ``passage.approach``, so that the poles of the
+    suspension meet the joints of the rails, at whole units from the first pier, at `JOINT_SHARE` of
+    a step.  That holds for all of them where units and C-frame spacings are whole numbers of pole
+    pitches, as by default; else for those of the first magnet at the first pier.
+
     Parameters
     ----------
     config
-        ``passage.time_step`` is the upper bound.
+        ``passage.time_step`` is the upper bound of the step.
 
     References
     ----------
     docs/theory/integration.md.
+
+    Examples
+    --------
+    >>> round(course(Config()).time_step * 1e3, 3)  # of 0.258 m at 430 km/h a quarter
+    0.54
     """
+    dt, speed = _time_step(config), config.passage.speed
+    start = _start(config, speed * dt)
+    way = config.guideway.length + config.train.length - start
+    fade_in = config.irregularity.fade_in if config.irregularity.enabled else 0.0
+    resting = (-start - fade_in) / speed / dt * (1 - 1e-9)
+    return Course(
+        time_step=dt,
+        speed=speed,
+        start=start,
+        n_steps=math.ceil(way / speed / dt),
+        first_step=max(1, math.floor(resting)),
+    )
+
+
+def _time_step(config: Config) -> float:
+    """Largest step that divides the period of pole passing as it should [s]."""
     pitch = config.train.suspension_magnet.pole_pitch
     period = pitch / config.passage.speed
     parts = math.ceil(period / config.passage.time_step * (1 - 1e-12))
@@ -48,40 +117,11 @@ def _first_pole(magnet: Magnet) -> float:
     return 0.5 * (magnet.n_poles - 1) * magnet.pole_pitch
 
 
-def start(config: Config) -> float:
-    """Place of the nose at time zero [m], the first pier at zero.
-
-    Less than a step before ``passage.approach``, so that the poles of the suspension meet the
-    joints of the rails, at whole units from the first pier, at `JOINT_SHARE` of a step.  That holds
-    for all of them where units and C-frame spacings are whole numbers of pole pitches, as by
-    default; else for those of the first magnet at the first pier.
-    """
-    advance = config.passage.speed * time_step(config)
+def _start(config: Config, advance: float) -> float:
+    """Place of the nose at time zero [m]."""
     pole = _first_pole(config.train.suspension_magnet) - 0.5 * config.train.car_pitch
     beyond = (pole - config.passage.approach) / advance + JOINT_SHARE
     return -config.passage.approach - round(beyond, 6) % 1.0 * advance
-
-
-def n_steps(config: Config) -> int:
-    """Number of time steps from the start until the tail has left the last span [-]."""
-    way = config.guideway.length + config.train.length - start(config)
-    return math.ceil(way / config.passage.speed / time_step(config))
-
-
-def first_step(config: Config) -> int:
-    """Number of the first step on which anything moves [-].
-
-    Until the nose reaches the irregularity, or without one the guideway, the train rests in its
-    equilibrium over rigid straight track: nothing need be computed.
-    """
-    fade_in = config.irregularity.fade_in if config.irregularity.enabled else 0.0
-    way = -start(config) - fade_in
-    return max(1, math.floor(way / config.passage.speed / time_step(config) * (1 - 1e-9)))
-
-
-def nose(config: Config, time: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Place of the nose after given times [m], the first pier at zero."""
-    return start(config) + config.passage.speed * np.asarray(time)
 
 
 def track_range(config: Config) -> tuple[float, float]:

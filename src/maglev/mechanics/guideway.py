@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
+from maglev.errors import UserError
 from maglev.mechanics import timoshenko
 from maglev.mechanics.timoshenko import PITCH, ROLL, YAW, FloatArray, X, Y, Z
 from maglev.parameters import BeamSection, Guideway, Pier
@@ -135,11 +136,11 @@ class GuidewayModel:
 
         Raises
         ------
-        ValueError
+        UserError
             If ``side`` is neither.
         """
         if side not in (RIGHT, LEFT):
-            raise ValueError(f"side must be {RIGHT} (right) or {LEFT} (left), got {side}")
+            raise UserError(f"side must be {RIGHT} (right) or {LEFT} (left), got {side}")
         return _line_rows(self.rail_lines[0 if side == RIGHT else 1], x, self.n_dof)
 
     def rail_section_rows(
@@ -323,7 +324,7 @@ def modes(model: GuidewayModel, cutoff_hz: float) -> tuple[FloatArray, FloatArra
 
     Raises
     ------
-    ValueError
+    UserError
         If the cut-off is not positive or the model has no modes above it.
     RuntimeError
         If the iteration missed a mode.
@@ -333,13 +334,13 @@ def modes(model: GuidewayModel, cutoff_hz: float) -> tuple[FloatArray, FloatArra
     Parlett, The Symmetric Eigenvalue Problem (1998), ch. 3 and 13.
     """
     if not cutoff_hz > 0:
-        raise ValueError(f"cutoff_hz must be positive, got {cutoff_hz} Hz")
+        raise UserError(f"cutoff_hz must be positive, got {cutoff_hz} Hz")
     K, M = model.stiffness.tocsc(), model.mass.tocsc()
     squared = (2 * math.pi * cutoff_hz) ** 2
     pivots = _factors(K - squared * M).U.diagonal()
     n_modes = int(np.count_nonzero(pivots < 0))
     if n_modes >= model.n_dof - 1:
-        raise ValueError(
+        raise UserError(
             f"cutoff_hz must lie below the model's highest mode, got {cutoff_hz} Hz; "
             "refine the model"
         )
@@ -382,7 +383,7 @@ def damping(model: GuidewayModel, ratio: float, cutoff_hz: float) -> ModalDampin
 
     Raises
     ------
-    ValueError
+    UserError
         If ``ratio`` is not in [0, 1), or for a cut-off that `modes` refuses.
 
     References
@@ -390,7 +391,7 @@ def damping(model: GuidewayModel, ratio: float, cutoff_hz: float) -> ModalDampin
     Wilson and Penzien, Int. J. Numer. Methods Eng. 4 (1972) 5-10.
     """
     if not 0 <= ratio < 1:
-        raise ValueError(f"damping ratio must lie in [0, 1), got {ratio}")
+        raise UserError(f"damping ratio must lie in [0, 1), got {ratio}")
     frequency, shape = modes(model, cutoff_hz)
     return ModalDamping(
         rate=2 * ratio * 2 * math.pi * cutoff_hz,
@@ -402,7 +403,7 @@ def damping(model: GuidewayModel, ratio: float, cutoff_hz: float) -> ModalDampin
     )
 
 
-def _factors(matrix: sparse.csc_array):
+def _factors(matrix: sparse.csc_array) -> SuperLU:
     """Factors of a symmetric matrix with pivots on the diagonal."""
     return splu(
         matrix,
@@ -458,7 +459,10 @@ def _span(guideway: Guideway) -> _Span:
     node_z = np.repeat([0.0, rail.z, rail.z], [n_girder, n_side, n_side])
     first = np.arange(n_girder - 1)
     girder = (first, first + 1)
-    rails = tuple((begin + element, begin + element + 1) for begin in (n_girder, n_girder + n_side))
+    right, left = (
+        (begin + element, begin + element + 1) for begin in (n_girder, n_girder + n_side)
+    )
+    rails = (right, left)
 
     # Full matrices, node by node.
     n_full = 6 * node_x.size
@@ -551,7 +555,7 @@ def rectangle_torsion_constant(width: float, depth: float) -> float:
 
     Raises
     ------
-    ValueError
+    UserError
         If a side is not positive.
 
     References
@@ -559,7 +563,7 @@ def rectangle_torsion_constant(width: float, depth: float) -> float:
     Timoshenko and Goodier, Theory of Elasticity (1970), sec. 109.
     """
     if not (width > 0 and depth > 0):
-        raise ValueError(f"sides must be positive, got {width} m and {depth} m")
+        raise UserError(f"sides must be positive, got {width} m and {depth} m")
     a, b = max(width, depth), min(width, depth)
     n = np.arange(1, 2 * _TORSION_TERMS, 2)
     series = np.sum(np.tanh(n * math.pi * a / (2 * b)) / n**5.0)
@@ -614,7 +618,9 @@ def _bearings(
         [span_start[:, np.newaxis] + end_dof[1], pier_start[1:, np.newaxis] + np.arange(6)]
     )
 
-    def summed(at_first: float, at_last: float, lateral: float, vertical: float):
+    def summed(
+        at_first: float, at_last: float, lateral: float, vertical: float
+    ) -> sparse.csr_array:
         blocks = []
         for longitudinal in (at_first, at_last):
             strength = np.tile([longitudinal, lateral, vertical], 2)
@@ -646,9 +652,9 @@ def _line(
     vertical, lateral = timoshenko.shear_flexibility(section, length)
 
     def plane(phi: FloatArray, displacement: int, rotation: int, sign: float) -> BeamPlane:
-        places = (6 * begin + displacement, 6 * begin + rotation)
-        places += (6 * end + displacement, 6 * end + rotation)
-        row = np.stack(places, axis=1)  # (element, 4) of span.motion
+        at_begin = (6 * begin + displacement, 6 * begin + rotation)
+        at_end = (6 * end + displacement, 6 * end + rotation)
+        row = np.stack([*at_begin, *at_end], axis=1)  # (element, 4) of span.motion
         first, count = span.motion.indptr[row], np.diff(span.motion.indptr)[row]
         term = np.arange(count.max())
         used = term < count[..., np.newaxis]

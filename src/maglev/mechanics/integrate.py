@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import packing
 from maglev.mechanics import train as train_model
@@ -18,14 +19,14 @@ from maglev.mechanics._records import (
     COMPLETED,
     NOT_FINITE,
     STEP_TOO_LARGE,
-    Line,
     MagnetRows,
     Outcome,
     Places,
     Run,
+    Spans,
     Vehicle,
 )
-from maglev.mechanics.course import time_step, track_range
+from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.linear import Block
@@ -56,7 +57,7 @@ class System:
     suspension_places: Places
     guidance_places: Places
     grounds: tuple[packing.Ground, packing.Ground]
-    line: Line
+    spans: Spans
     parts: tuple[Block, ...]
     safe_gains: Array
     config: Config
@@ -83,7 +84,7 @@ def prepare(config: Config, profile: Profile) -> System:
 
     Raises
     ------
-    ValueError
+    UserError
         If the time step exceeds the stability limit or the profile is shorter than the run.
     """
     train = train_model.build(config.train)
@@ -110,9 +111,9 @@ def prepare(config: Config, profile: Profile) -> System:
         suspension_places=suspension_places._replace(rail=tracks[0][0], ramp=tracks[0][1]),
         guidance_places=guidance_places._replace(rail=tracks[1][0], ramp=tracks[1][1]),
         grounds=grounds,
-        line=packing.line(reduced, config),
+        spans=packing.spans(reduced, config),
         parts=parts,
-        safe_gains=safe_gains(parts, _mean_gains(config), time_step(config)),
+        safe_gains=safe_gains(parts, _mean_gains(config), course(config).time_step),
         config=config,
     )
 
@@ -156,7 +157,7 @@ def integrate(
 
     Raises
     ------
-    ValueError
+    UserError
         If the gains have the wrong shape or are not finite.
     """
     config = system.config
@@ -199,7 +200,7 @@ def integrate(
             guidance_law,
             suspension_places,
             guidance_places,
-            system.line,
+            system.spans,
             run,
             lanes,
             outcome,
@@ -216,12 +217,12 @@ def integrate(
 
 def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ...]) -> None:
     """Refuse a step at which the guideway, or the train at its mean gains, would grow by itself."""
-    dt, gains = time_step(config), _mean_gains(config)
+    dt, gains = course(config).time_step, _mean_gains(config)
     limit = guideway_limit(config, reduced, dt)
     if not step_holds(parts, gains, dt):
         limit = min(limit, train_limit(parts, gains))
     if not dt < limit:
-        raise ValueError(
+        raise UserError(
             f"passage.time_step must be below the stability limit of {limit * 1e3:.3g} ms, "
             f"got {dt * 1e3:.3g} ms; take a smaller step or lower passage.mode_cutoff"
         )
@@ -236,7 +237,7 @@ def _check_reach(config: Config, profile: Profile) -> None:
     start, stop = track_range(config)
     grid_stop = profile.x0 + profile.dx * (profile.values.shape[1] - 1)
     if profile.x0 > start or grid_stop < stop:
-        raise ValueError(
+        raise UserError(
             f"the irregularity must reach from {start:.1f} m to {stop:.1f} m, "
             f"got {profile.x0:.1f} m to {grid_stop:.1f} m"
         )
@@ -264,7 +265,8 @@ def _gathered(
     when[status != COMPLETED] = np.nan
     # A lost sample goes on in its row as long as others hold; what it does then means nothing.
     lost_time, is_lost = samples_first("lost_time"), samples_first("lost_magnet") >= 0
-    time = (np.arange(outcomes[0].history.shape[0]) + 1) * (run.record_every * run.time_step)
+    number = np.arange(1.0, outcomes[0].history.shape[0] + 1)
+    time = number * (run.record_every * run.time_step)
     history = np.moveaxis(samples_first("history"), 1, 2).copy()
     for sample in np.flatnonzero(is_lost):
         history[sample, :, time >= lost_time[sample] - 0.5 * run.time_step] = np.nan

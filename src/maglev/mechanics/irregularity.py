@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scipy.fft import ifft, next_fast_len
 from scipy.interpolate import CubicSpline
 
+from maglev.errors import UserError
 from maglev.parameters import GermanLaw, Irregularity, PowerLaw, RationalLaw, Spectrum
 
 FloatArray = npt.NDArray[np.float64]
@@ -96,7 +97,7 @@ def profile(
 
     Raises
     ------
-    ValueError
+    UserError
         If the range is empty, a profile file is named but not given, the measured profile does not
         cover the range from the start of the fade-in, or a spectrum is negative.
 
@@ -106,20 +107,20 @@ def profile(
     """
     start, end = length_range
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
-        raise ValueError(f"length_range must rise from finite start to end, got {length_range} m")
+        raise UserError(f"length_range must rise from finite start to end, got {length_range} m")
     random = irregularity.enabled and measured is None
     dx, period = _grid(irregularity) if random else (_coarse(irregularity), 0)
     first, last = math.floor(start / dx), math.ceil(end / dx)
     if random:  # the spacing has no end, so an end of the range may fall beside its point
         first, last = first - 1, last + 1
-    x = np.arange(first, last + 1) * dx
+    x = np.arange(first, last + 1, dtype=float) * dx
     if not irregularity.enabled:
         zeros = np.zeros((len(PROFILE_NAMES), x.size))
         return Profile(x0=float(x[0]), dx=dx, values=zeros, slopes=zeros.copy())
     if measured is not None:
         values, slopes = _splined(measured, x, max(start, -irregularity.fade_in), end)
     elif irregularity.profile_file is not None:
-        raise ValueError(
+        raise UserError(
             f"irregularity.profile_file is {irregularity.profile_file!r} but its profile was not "
             "read; give it as 'measured'"
         )
@@ -153,13 +154,13 @@ def displacement(profile: Profile, x: npt.ArrayLike) -> tuple[FloatArray, FloatA
 
     Raises
     ------
-    ValueError
+    UserError
         If a place lies outside the grid.
     """
     position = (np.asarray(x, dtype=float) - profile.x0) / profile.dx
     n = profile.values.shape[1]
     if not np.all((position >= 0) & (position <= n - 1)):
-        raise ValueError(
+        raise UserError(
             f"places must lie in the profile's range {profile.x0:g} to "
             f"{profile.x0 + (n - 1) * profile.dx:g} m, got {np.min(x):g} to {np.max(x):g} m"
         )
@@ -196,7 +197,7 @@ def mean_displacement(
 
     Raises
     ------
-    ValueError
+    UserError
         If a face reaches beyond the grid.
     """
     x = np.asarray(x, dtype=float)
@@ -239,7 +240,7 @@ def spectral_density(spectrum: Spectrum, wavenumber: npt.ArrayLike) -> FloatArra
 
     Raises
     ------
-    ValueError
+    UserError
         If the law is negative or not finite somewhere.
 
     References
@@ -261,7 +262,7 @@ def spectral_density(spectrum: Spectrum, wavenumber: npt.ArrayLike) -> FloatArra
             density = 2 * np.pi * A * c**2 / ((omega**2 + r**2) * (omega**2 + c**2))
     bad = ~(np.isfinite(density) & (density >= 0))
     if np.any(bad):
-        raise ValueError(
+        raise UserError(
             f"spectrum with law {spectrum.law!r} must be finite and not negative, got "
             f"{density[bad].flat[0]:g} m^3 at n = {n[bad].flat[0]:g} 1/m"
         )
@@ -288,7 +289,8 @@ def wavenumbers(irregularity: Irregularity) -> tuple[FloatArray, float]:
     """
     lowest = 1 / irregularity.wavelength_max
     spacing = (1 / irregularity.wavelength_min - lowest) / irregularity.n_harmonics
-    return lowest + (np.arange(irregularity.n_harmonics) + 0.5) * spacing, spacing
+    number = np.arange(irregularity.n_harmonics, dtype=float)
+    return lowest + (number + 0.5) * spacing, spacing
 
 
 def _coarse(irregularity: Irregularity) -> float:
@@ -312,9 +314,9 @@ def _random(
     wavenumber, spacing = wavenumbers(irregularity)
     children = np.random.SeedSequence(seed).spawn(len(PROFILE_NAMES))
     rows = []
-    for spectrum, right, left in (
-        (irregularity.vertical, *children[:2]),
-        (irregularity.lateral, *children[2:]),
+    for spectrum, (right, left) in (
+        (irregularity.vertical, children[:2]),
+        (irregularity.lateral, children[2:]),
     ):
         amplitude = np.sqrt(2 * spectral_density(spectrum, wavenumber) * spacing)
         sides = (right,) if irregularity.sides == "shared" else (right, left)
@@ -356,7 +358,7 @@ def _splined(
 ) -> tuple[FloatArray, FloatArray]:
     """Cubic spline through a measured profile; beyond its ends it keeps its last value."""
     if measured.x[0] > start or measured.x[-1] < end:
-        raise ValueError(
+        raise UserError(
             f"{measured.source} must cover the run from {start:g} to {end:g} m, "
             f"got {measured.x[0]:g} to {measured.x[-1]:g} m"
         )

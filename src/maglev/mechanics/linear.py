@@ -21,6 +21,8 @@ import scipy.linalg
 from scipy.optimize import brentq
 from scipy.sparse.csgraph import connected_components
 
+from maglev.arrays import ComplexArray
+from maglev.errors import UserError
 from maglev.mechanics.car import N_BOGIES, N_C_FRAMES
 from maglev.mechanics.control import circuits
 from maglev.mechanics.train import TrainModel, pole_offsets, pole_static_force
@@ -243,7 +245,9 @@ def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
     """
     n = block.mass.size
     sizes = [n, n]
-    integral, current, late = [], [], []
+    integral: list[slice] = []
+    current: list[slice] = []
+    late: list[slice] = []
     for (_, _, _, k_i), loop in zip(of_kinds(gains), block.loops, strict=True):
         for places, wanted, times in (
             (integral, k_i != 0.0, 1),
@@ -292,7 +296,7 @@ def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
     return state
 
 
-def characteristic(block: Block, gains: Array, s: complex) -> tuple[Array, Array]:
+def characteristic(block: Block, gains: Array, s: complex) -> tuple[ComplexArray, ComplexArray]:
     """The matrix of the block's motion at s, and its derivative by s; exact for any delay.
 
     Parameters
@@ -448,7 +452,7 @@ def border(
 
     Raises
     ------
-    ValueError
+    UserError
         If the train is not stable at the start.
     """
 
@@ -460,7 +464,7 @@ def border(
     values = np.linspace(gains[gain], limit, n_steps + 1)
     before = rate(values[0])
     if not before < 0:
-        raise ValueError(
+        raise UserError(
             f"the train must be stable where the search starts, grows by {before:g} 1/s"
         )
     for inner, outer in itertools.pairwise(values):
@@ -477,7 +481,7 @@ def _rightmost(roots: npt.NDArray[np.complex128]) -> complex:
     return complex(max(roots[roots.imag >= 0], key=lambda root: root.real))
 
 
-def _polished(block: Block, gains: Array, root: complex, shape: Array) -> complex:
+def _polished(block: Block, gains: Array, root: complex, shape: ComplexArray) -> complex:
     """Newton's method on the characteristic equation, from an eigenvalue and its motion."""
     kept = shape.conj() / (np.abs(shape) ** 2).sum()
     for _ in range(_MOST_STEPS):

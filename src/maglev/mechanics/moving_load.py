@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from maglev.errors import UserError
+
 FloatArray = npt.NDArray[np.float64]
 
 
@@ -34,7 +36,7 @@ class Beam:
 
     Raises
     ------
-    ValueError
+    UserError
         If a value is not positive, or the damping ratio not in [0, 1).
     """
 
@@ -46,9 +48,9 @@ class Beam:
     def __post_init__(self) -> None:
         for name in ("length", "bending_stiffness", "mass_per_length"):
             if not getattr(self, name) > 0:
-                raise ValueError(f"Beam.{name} must be positive, got {getattr(self, name)}")
+                raise UserError(f"Beam.{name} must be positive, got {getattr(self, name)}")
         if not 0 <= self.damping_ratio < 1:
-            raise ValueError(f"Beam.damping_ratio must lie in [0, 1), got {self.damping_ratio}")
+            raise UserError(f"Beam.damping_ratio must lie in [0, 1), got {self.damping_ratio}")
 
     def frequency(self, mode: int = 1) -> float:
         """Natural frequency (nπ/L)² √(EI/m) / 2π [Hz]."""
@@ -163,7 +165,7 @@ def midspan_deflection(
 
     Raises
     ------
-    ValueError
+    UserError
         If the speed or the load's length is not positive.
 
     References
@@ -171,7 +173,7 @@ def midspan_deflection(
     Frýba, Vibration of Solids and Structures under Moving Loads (1999), ch. 3.
     """
     if not (speed > 0 and load_length > 0):
-        raise ValueError(
+        raise UserError(
             f"speed and load_length must be positive, got {speed} m/s and {load_length} m"
         )
     t = np.asarray(time, dtype=float)
@@ -206,11 +208,11 @@ def dynamic_factor(beam: Beam, load_length: float, speed: float) -> float:
 
     Raises
     ------
-    ValueError
+    UserError
         If the load is shorter than the beam, or as `midspan_deflection`.
     """
     if load_length < beam.length:
-        raise ValueError(
+        raise UserError(
             f"the load must cover the beam of {beam.length:g} m, got a length of {load_length:g} m"
         )
     period = 1 / beam.frequency()

@@ -13,17 +13,17 @@ from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics._records import (
     Law,
-    Line,
     MagnetRows,
     Outcome,
     Places,
     Run,
-    Stages,
+    Spans,
+    Stretches,
     Vehicle,
 )
-from maglev.mechanics.activity import Stage, stages, stepped_mass, top_stiffness
+from maglev.mechanics.activity import Stretch, stepped_mass, stretches, top_stiffness
 from maglev.mechanics.control import grouping, late_current
-from maglev.mechanics.course import first_step, n_steps, start, time_step
+from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile, mean_displacement
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import ReducedGuideway, face_weights, standing_sag
@@ -154,7 +154,7 @@ def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: Array) -> L
         feed_pole=feed.indices.astype(np.int64),
         feed_weight=feed.data.astype(np.float64),
         arm=group.feed @ rows.arm,
-        senses=group.feed.any(axis=0).astype(np.int64),
+        senses=np.any(group.feed, axis=0).astype(np.int64),
         first=np.array([pair[0] for pair in pairs], dtype=np.int64),
         second=np.array([pair[-1] for pair in pairs], dtype=np.int64),
         decay=late.decay,
@@ -183,20 +183,20 @@ def places(
     reduced: ReducedGuideway,
 ) -> tuple[Places, Ground]:
     """Tabulate what the poles meet after whole numbers of steps; no track yet."""
-    advance = config.passage.speed * time_step(config)
-    begins = (rows.x[:, None] + rows.offset + start(config)) / advance
+    way = course(config)
+    begins = (rows.x[:, None] + rows.offset + way.start) / way.advance
     whole = np.floor(begins + 1e-6)
     beyond = np.round(begins - whole, 6)  # share of a step; places with the same one form a series
     series = np.unique(beyond)
     earliest = int(whole.min())
-    count = int(whole.max()) - earliest + n_steps(config) + 1
+    count = int(whole.max()) - earliest + way.n_steps + 1
     number = (whole - earliest).astype(np.int64) + count * np.searchsorted(series, beyond)
-    x = ((earliest + np.arange(count) + series[:, None]) * advance).ravel()
+    x = ((earliest + np.arange(count) + series[:, None]) * way.advance).ravel()
     magnet = _magnet(config, rows)
     faces = face_weights(
-        config.guideway, x, magnet.pole_length, lateral=rows.is_guidance, advance=advance
+        config.guideway, x, magnet.pole_length, lateral=rows.is_guidance, advance=way.advance
     )
-    sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x, advance)
+    sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x, way.advance)
     apart = np.array([1.0, -1.0 if rows.is_guidance else 1.0])
     nothing = np.zeros((x.size, 2, 1))
     tabulated = Places(
@@ -274,8 +274,9 @@ def _standing_sag(
     return sag, slope
 
 
-def line(reduced: ReducedGuideway, config: Config) -> Line:
+def spans(reduced: ReducedGuideway, config: Config) -> Spans:
     """Guideway for the kernels."""
+    way = course(config)
     columns, n = reduced.span_coordinates, reduced.n_modes
     rails = [
         [_relative(reduced, span, shapes[span]) for span in range(len(columns))]
@@ -301,22 +302,22 @@ def line(reduced: ReducedGuideway, config: Config) -> Line:
     upright, sideways = moving(rails[0]), moving(*rails[1:])
     upright_start, upright_column = numbered(upright)
     sideways_start, sideways_column = numbered(sideways)
-    response = step_response(reduced, time_step(config))
+    response = step_response(reduced, way.time_step)
     middle = reduced.parameters.n_spans // 2
     midspan = np.stack(
         [_relative(reduced, middle, shape) for shape in (reduced.midspan_z, reduced.midspan_y)]
     )
     carried_start, carried_top, carried = _rows(reduced.carried)
     stiffness_start, stiffness_top, stiffness = _rows(top_stiffness(reduced))
-    of_passage = stages(config, reduced)
-    always = np.logical_and.reduce([stage.stepped for stage in of_passage])
+    of_passage = stretches(config, reduced)
+    always = np.logical_and.reduce([stretch.stepped for stretch in of_passage])
     damping_start, damping_column, damping = _rows(
-        _whole_and_short(_stepped_damping(reduced, time_step(config)), always)
+        _whole_and_short(_stepped_damping(reduced, way.time_step), always)
     )
     taken_start, taken_mode, taken = _rows(
         _whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
     )
-    return Line(
+    return Spans(
         n_spans=reduced.parameters.n_spans,
         span_length=reduced.parameters.span_length,
         stride=_stride(reduced.parameters),
@@ -344,7 +345,7 @@ def line(reduced: ReducedGuideway, config: Config) -> Line:
         damping=damping,
         taken_mode=taken_mode,
         taken=taken,
-        stages=_stages(reduced, config, of_passage, damping_start, taken_start),
+        stretches=_stretches(reduced, config, of_passage, damping_start, taken_start),
     )
 
 
@@ -371,7 +372,7 @@ def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array
 
 
 def _whole_and_short(matrix: sp.csr_array, always: npt.NDArray[np.bool_]) -> sp.csr_array:
-    """The rows of a matrix, then the same without the columns that are not stepped in all stages.
+    """The rows of a matrix, then the same without columns that are not stepped in all stretches.
 
     Short rows are those of quiet spans.
     """
@@ -380,26 +381,29 @@ def _whole_and_short(matrix: sp.csr_array, always: npt.NDArray[np.bool_]) -> sp.
     return both
 
 
-def _stages(
+def _stretches(
     reduced: ReducedGuideway,
     config: Config,
-    of_passage: list[Stage],
+    of_passage: list[Stretch],
     damping_start: IntArray,
     taken_start: IntArray,
-) -> Stages:
-    """What is stepped in each stage, and where its whole or short rows of damping and of what modes
-    take along begin and end."""
+) -> Stretches:
+    """What is stepped in each stretch.
+
+    Also where its rows begin and end, whole or short, of damping and of what modes take along.
+    """
     n = reduced.n_modes
+    dt = course(config).time_step
     starts, tops_from, stepped, rows = [0], [], [], []
     factor_rows, factor_start, inverse = [], [0], []
     stilled = []
     before = np.zeros(reduced.n_coordinates, dtype=bool)
-    for stage in of_passage:
-        modes = np.flatnonzero(stage.stepped[:n])
-        tops, factor = stepped_mass(reduced, stage.stepped, time_step(config))
+    for stretch in of_passage:
+        modes = np.flatnonzero(stretch.stepped[:n])
+        tops, factor = stepped_mass(reduced, stretch.stepped, dt)
         coordinates = np.concatenate([modes, tops])
         stepped.append(coordinates)
-        rows.append(coordinates + np.where(stage.awake[coordinates], 0, reduced.n_coordinates))
+        rows.append(coordinates + np.where(stretch.awake[coordinates], 0, reduced.n_coordinates))
         tops_from.append(starts[-1] + modes.size)
         starts.append(starts[-1] + coordinates.size)
         factor_start += [factor_start[-1]] * modes.size
@@ -409,13 +413,13 @@ def _stages(
             met = np.flatnonzero(row[:k])
             factor_rows.append((tops[met], row[met]))
             factor_start.append(factor_start[-1] + met.size)
-        stilled.append(np.flatnonzero(before & ~stage.stepped))
-        before = stage.stepped
+        stilled.append(np.flatnonzero(before & ~stretch.stepped))
+        before = stretch.stepped
     row = np.concatenate(rows)
     top_row = np.maximum(row % reduced.n_coordinates - n, 0)
     top_row += np.where(row >= reduced.n_coordinates, reduced.n_coordinates - n, 0)
-    return Stages(
-        first_step=np.array([stage.first_step for stage in of_passage]),
+    return Stretches(
+        first_step=np.array([stretch.first_step for stretch in of_passage]),
         start=np.array(starts),
         tops=np.array(tops_from),
         stepped=np.concatenate(stepped),
@@ -440,17 +444,17 @@ def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, Array]:
 
 def run(config: Config, record_every: int) -> Run:
     passage = config.passage
-    dt = time_step(config)
+    way = course(config)
     return Run(
-        first_step=first_step(config),
-        n_steps=n_steps(config),
-        time_step=dt,
+        first_step=way.first_step,
+        n_steps=way.n_steps,
+        time_step=way.time_step,
         speed=passage.speed,
-        start=start(config),
+        start=way.start,
         train_length=config.train.length,
         gap_contact=passage.gap_contact,
         gap_lost=passage.gap_lost,
-        sections=np.ascontiguousarray(acceleration_filter(passage, dt)),
+        sections=np.ascontiguousarray(acceleration_filter(passage, way.time_step)),
         record_every=record_every,
     )
 

@@ -375,7 +375,7 @@ def standing_sag(
     sag = both[np.arange(n_points), np.arange(n_points) % n_phases].reshape(n_units, -1)
     slope, half = np.gradient(sag, length / n_points, axis=1), length / n_points / 2
     ends = np.arange(n_units)[:, None] * length / n_units + [0.0, length / n_units - 1e-9]
-    return tuple(
+    x, sag, slope = (
         np.column_stack([first, inner, last]).ravel()
         for first, inner, last in (
             (ends[:, 0], x.reshape(n_units, -1), ends[:, 1]),
@@ -383,6 +383,7 @@ def standing_sag(
             (slope[:, 0], slope, slope[:, -1]),
         )
     )
+    return x, sag, slope
 
 
 def _moving_mean(n_points: int, width: float) -> sp.csr_array:

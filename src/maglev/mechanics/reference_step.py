@@ -15,7 +15,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import nose
+from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.reference_magnets import (
     Charge,
@@ -372,7 +372,7 @@ def views(of: System, first: int, stop: int) -> Iterator[View]:
     speed, n = of.config.passage.speed, of.poles.x.size
     for begin in range(first, stop, BLOCK):
         time = (np.arange(begin, min(begin + BLOCK, stop)) + 1) * of.step
-        place = nose(of.config, time)[:, None] + of.poles.x
+        place = course(of.config).nose(time)[:, None] + of.poles.x
         reached = (place + 0.5 * (of.poles.face + speed * of.step)).max(axis=1) >= 0
         bump, bump_rate = of.track.under(place, speed)
         mean, travel = of.rails.under(place, speed, of.step)
@@ -419,4 +419,4 @@ def held(of: System, magnets: Magnets) -> npt.NDArray[np.bool_]:
     """Which samples (sample,) have every gap between contact and loss."""
     passage = of.config.passage
     between = (magnets.gap > passage.gap_contact) & (magnets.gap < passage.gap_lost)
-    return between.all(axis=0) & np.isfinite(magnets.force).all(axis=0)
+    return np.all(between & np.isfinite(magnets.force), axis=0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from maglev.errors import UserError
 from maglev.parameters import Passage
 
 Array = npt.NDArray[np.float64]
@@ -82,20 +83,18 @@ def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4)
 
     Raises
     ------
-    ValueError
+    UserError
         If they have another shape, no sample, or a value that is not finite.
     """
     array = np.asarray(gains, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] not in (4, 8):
         hint = "; transpose them" if array.ndim == 2 and array.shape[0] in (4, 8) else ""
-        raise ValueError(
-            f"gains have shape {array.shape}, expected (sample, gain) = (any, 4){hint}"
-        )
+        raise UserError(f"gains have shape {array.shape}, expected (sample, gain) = (any, 4){hint}")
     if array.shape[0] == 0:
-        raise ValueError("gains have no sample, expected at least one row")
+        raise UserError("gains have no sample, expected at least one row")
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if bad.size:
-        raise ValueError(
+        raise UserError(
             f"gains must be finite, got {array[bad[0]].tolist()} at sample {bad[0]}"
             + (f" and {bad.size - 1} more such samples" if bad.size > 1 else "")
         )
@@ -121,7 +120,7 @@ def acceleration_filter(passage: Passage, time_step: float) -> Array:
 
     Raises
     ------
-    ValueError
+    UserError
         If the band reaches half the sampling rate.
 
     Notes
@@ -141,7 +140,7 @@ def acceleration_filter(passage: Passage, time_step: float) -> Array:
     if band is None:
         return np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]])
     if not band < 0.5 / time_step:
-        raise ValueError(
+        raise UserError(
             "passage.acceleration_band must be below half the sampling rate, "
             f"{0.5 / time_step:g} Hz, got {band:g} Hz"
         )

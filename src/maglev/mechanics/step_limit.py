@@ -26,7 +26,7 @@ DAMPING_MARGIN = 1.4
 """Damping ratio of a component mode on its own over that of the guideway's modes, at most [-];
 measured 1.25 with the default parameters."""
 
-LINE_MARGIN = 0.92
+GUIDEWAY_MARGIN = 0.92
 """Stable step of the whole guideway over that of its modes, which damping couples, each on its own
 [-]; measured 0.93 or more."""
 
@@ -64,7 +64,7 @@ def guideway_limit(config: Config, reduced: ReducedGuideway, time_step: float) -
     square = scipy.linalg.eigvalsh(stepped_stiffness(reduced), inertia)[-1]
     fastest = math.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes].max(initial=1e-12))
     return min(
-        LINE_MARGIN * _largest_phase(ratio) / math.sqrt(square),
+        GUIDEWAY_MARGIN * _largest_phase(ratio) / math.sqrt(square),
         _largest_phase(DAMPING_MARGIN * ratio, exact=True) / fastest,
     )
 
@@ -226,12 +226,12 @@ def step_matrix(block: Block, gains: Array, time_step: float) -> Array:
         inertia[:, freedoms] += k_a * way.direct * loop.pull
         rows.append((freedoms, way, k_a, [integral, new_x[freedoms], command, current, *signals]))
     acceleration = np.linalg.solve(inertia, force)
-    memories = []
-    for freedoms, way, k_a, memory in rows:
+    memories: list[Array] = []
+    for freedoms, way, k_a, kept in rows:
         answered = k_a * acceleration[freedoms]
-        memory[2] = memory[2] + way.undelayed * answered
-        memory[3] = memory[3] + way.direct * answered
-        memories += memory
+        kept[2] = kept[2] + way.undelayed * answered
+        kept[3] = kept[3] + way.direct * answered
+        memories += kept
     return np.concatenate([new_x, new_v, acceleration, a, *memories])
 
 
@@ -251,9 +251,9 @@ def _largest_phase(ratio: float, *, exact: bool = False) -> float:
     predicted = kicked + np.array([0.0, 0.0, 1.0, -0.5])
     acceleration = -scale[:, None] * (phases[:, None] ** 2 * ahead + rate[:, None] * predicted)
     shape = acceleration.shape
-    steps = [np.broadcast_to(row, shape) for row in (ahead, kicked, np.array([0.0, 0, 1, 0]))]
-    steps = np.stack([steps[0], steps[1], acceleration, steps[2]], axis=1)
-    grows = np.abs(np.linalg.eigvals(steps)).max(axis=1) > 1 + 1e-9
+    rows = [np.broadcast_to(row, shape) for row in (ahead, kicked, np.array([0.0, 0, 1, 0]))]
+    step = np.stack([rows[0], rows[1], acceleration, rows[2]], axis=1)
+    grows = np.abs(np.linalg.eigvals(step)).max(axis=1) > 1 + 1e-9
     return float(phases[grows.argmax()] - 0.02) if grows.any() else float(phases[-1])
 
 

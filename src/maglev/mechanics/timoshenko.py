@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from maglev.errors import UserError
 from maglev.parameters import BeamSection
 
 FloatArray = npt.NDArray[np.float64]
@@ -45,7 +46,7 @@ def shear_flexibility(section: BeamSection, length: npt.ArrayLike) -> tuple[Floa
 
     Raises
     ------
-    ValueError
+    UserError
         If a length is not positive.
 
     References
@@ -54,7 +55,7 @@ def shear_flexibility(section: BeamSection, length: npt.ArrayLike) -> tuple[Floa
     """
     L = np.asarray(length, dtype=float)
     if not np.all(L > 0):
-        raise ValueError(f"element length must be positive, got {np.min(L)} m")
+        raise UserError(f"element length must be positive, got {np.min(L)} m")
     E, GA = section.elastic_modulus, section.shear_modulus * section.area
     vertical = 12 * E * section.second_moment_vertical / section.shear_coefficient_vertical
     lateral = 12 * E * section.second_moment_lateral / section.shear_coefficient_lateral
@@ -163,7 +164,7 @@ def displacement_shape(section: BeamSection, length: float, x: npt.ArrayLike) ->
 
     Raises
     ------
-    ValueError
+    UserError
         If ``length`` is not positive.
     """
     vertical, lateral = shear_flexibility(section, length)
@@ -193,7 +194,7 @@ def stiffness(section: BeamSection, length: float) -> FloatArray:
 
     Raises
     ------
-    ValueError
+    UserError
         If ``length`` is not positive.
 
     References
@@ -244,7 +245,7 @@ def mass(section: BeamSection, length: float) -> FloatArray:
 
     Raises
     ------
-    ValueError
+    UserError
         If ``length`` is not positive.
 
     References

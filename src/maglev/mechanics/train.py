@@ -15,12 +15,14 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
+from maglev.errors import UserError
 from maglev.mechanics.bodies import FloatArray, IntArray, assembled, link_rows
 from maglev.mechanics.car import (
     LEFT,
     N_C_FRAMES,
     RIGHT,
     Assembly,
+    Car,
     HungMagnet,
     add_car,
     add_magnet,
@@ -118,7 +120,7 @@ def build(train: Train) -> TrainModel:
 
     Raises
     ------
-    ValueError
+    UserError
         If the guidance magnets have no preload, the suspension magnets have one, or a pole would
         have to push at rest.
 
@@ -126,9 +128,9 @@ def build(train: Train) -> TrainModel:
     ----------
     docs/theory/train.md.
     """
-    _check_preloads(train)
+    preload = _checked_preload(train)
     assembly = Assembly()
-    cars = []
+    cars: list[Car] = []
     magnets: list[tuple[int, HungMagnet]] = []
     for number in range(train.n_cars):
         car = add_car(
@@ -165,7 +167,7 @@ def build(train: Train) -> TrainModel:
     link_damping = np.array([link.damping for link in assembly.links])
     stiffness = assembled(rows, link_stiffness)
     weight = np.array(assembly.weight)
-    table = _magnet_table(train, magnets, stiffness, weight)
+    table = _magnet_table(train, magnets, stiffness, weight, preload)
     pole_static_force(train, table)  # refuses a magnet whose poles cannot carry its load
     return TrainModel(
         parameters=train,
@@ -195,7 +197,7 @@ def pole_offsets(magnet: Magnet) -> FloatArray:
     offset : (pole,)
         x relative to the magnet's centre [m], falling.
     """
-    return (0.5 * (magnet.n_poles - 1) - np.arange(magnet.n_poles)) * magnet.pole_pitch
+    return (0.5 * (magnet.n_poles - 1) - np.arange(magnet.n_poles, dtype=float)) * magnet.pole_pitch
 
 
 def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
@@ -220,7 +222,7 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
 
     Raises
     ------
-    ValueError
+    UserError
         If a pole would have to push, or a single pole to carry a moment.
     """
     kinds = (train.suspension_magnet, train.guidance_magnet)
@@ -231,7 +233,7 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
         lever = np.abs(offset).sum()
         moment = magnets.static_moment[rows, None]
         if lever == 0 and np.any(moment != 0):
-            raise ValueError(
+            raise UserError(
                 "train.suspension_magnet.n_poles must be at least 2 to carry a moment at rest, "
                 f"got {kind.n_poles}"
             )
@@ -239,24 +241,27 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
         force[rows, : kind.n_poles] = magnets.static_force[rows, None] / kind.n_poles + uneven
         least = force[rows, : kind.n_poles].min()
         if not least > 0:
-            raise ValueError(
+            raise UserError(
                 f"each pole must attract at rest, got {least:g} N at a pole of a "
                 f"{'guidance' if is_guidance else 'suspension'} magnet"
             )
     return force
 
 
-def _check_preloads(train: Train) -> None:
-    if train.guidance_magnet.preload is None or not train.guidance_magnet.preload > 0:
-        raise ValueError(
+def _checked_preload(train: Train) -> float:
+    """Force of a guidance magnet at rest [N]; what the suspension magnets carry is not given."""
+    preload = train.guidance_magnet.preload
+    if preload is None or not preload > 0:
+        raise UserError(
             "train.guidance_magnet.preload must be a positive force, such as '10 kN', "
-            f"got {train.guidance_magnet.preload}"
+            f"got {preload}"
         )
     if train.suspension_magnet.preload is not None:
-        raise ValueError(
+        raise UserError(
             "train.suspension_magnet.preload must be null, for the magnet carries its share of "
             f"the weight, got {train.suspension_magnet.preload:g} N"
         )
+    return preload
 
 
 def _magnet_table(
@@ -264,6 +269,7 @@ def _magnet_table(
     magnets: list[tuple[int, HungMagnet]],
     stiffness: sp.csr_array,
     weight: FloatArray,
+    preload: float,
 ) -> MagnetTable:
     """Collect the magnets and find what each carries with all of them held still."""
     is_guidance = np.array([magnet.is_guidance for _, magnet in magnets])
@@ -281,14 +287,14 @@ def _magnet_table(
     elastic = stiffness @ sag
     # Poles pull with sum(F) upwards and turn with sum(F dx): weight - K u - sum(F) = 0 on z,
     # - K u + sum(F dx) = 0 on theta.
-    preload = train.guidance_magnet.preload
+    carried = weight[translation] - elastic[translation]
     return MagnetTable(
         is_guidance=is_guidance,
         side=np.array([magnet.side for _, magnet in magnets]),
         x=x,
         translation_dof=translation,
         rotation_dof=rotation,
-        static_force=np.where(is_guidance, preload, weight[translation] - elastic[translation]),
+        static_force=np.where(is_guidance, preload, carried),
         static_moment=np.where(is_guidance, 0.0, elastic[rotation]),
         car=car,
     )

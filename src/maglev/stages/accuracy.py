@@ -82,7 +82,7 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
 
     Raises
     ------
-    ValueError
+    UserError
         If a design cannot be fitted.
     """
     levels = config.study.failure_probability
@@ -95,7 +95,7 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
         np.array([one.limit for one in of]) for of in (reference, held_reference)
     )
     half_width, held_half_width = (
-        np.array([0.5 * (one.upper - one.lower) for one in of]) / sigma[:, None]
+        np.array([one.half_width for one in of]) / sigma[:, None]
         for of in (reference, held_reference)
     )
 

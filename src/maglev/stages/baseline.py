@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from maglev.datasets import carried
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.reads import RUNS_OF_CASE
@@ -37,7 +38,7 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If a sample is missing, stands twice or was run at another point.
     """
     points, chunks = baseline_points, list(baseline_chunk.values())
@@ -51,9 +52,9 @@ def dataset(
     )
     n = points.sizes["sample"]
     if not np.array_equal(whole["sample"], np.arange(n)):
-        raise ValueError(f"the chunks must hold the samples 0 to {n - 1} once each, in order")
+        raise UserError(f"the chunks must hold the samples 0 to {n - 1} once each, in order")
     if not np.array_equal(whole["standard"], points["standard"]):
-        raise ValueError("the chunks must have been run at the points of the baseline; do it again")
+        raise UserError("the chunks must have been run at the points of the baseline; do it again")
     whole.attrs = carried(chunks[0])
     whole["probability"] = (("sample",), points["probability"].values)
     return whole

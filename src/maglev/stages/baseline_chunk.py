@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Stage
 from maglev.stages.points import baseline, case_of, track_seeds
@@ -42,11 +43,11 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If there are no such samples, or as `stored_runs`.
     """
     if not 0 <= start < stop:
-        raise ValueError(f"samples must be numbered upwards from 0 or more, got {start} to {stop}")
+        raise UserError(f"samples must be numbered upwards from 0 or more, got {start} to {stop}")
     rows = range(start, stop)
     seeds = None
     if case_of(config, case).random_track:

@@ -31,7 +31,7 @@ def dataset(config: Config, case: str) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no such case.
     """
     inputs, n = marginals(config, case), n_samples(config, case)

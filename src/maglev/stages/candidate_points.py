@@ -33,7 +33,7 @@ def dataset(config: Config, case: str, method: str) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no such case.
     """
     n, key = getattr(config.study, method).n_candidates, f"candidates_{method}"

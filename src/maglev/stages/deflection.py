@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.mechanics import train
-from maglev.mechanics.course import start
+from maglev.mechanics.course import course
 from maglev.mechanics.moving_load import midspan_deflection
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
@@ -34,13 +35,13 @@ def dataset(config: Config, passage: xr.Dataset) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If the passage has no histories.
     """
     if "girder_displacement_z_history" not in passage:
-        raise ValueError("deflection: the passage has no histories")
+        raise UserError("deflection: the passage has no histories")
     beam, load = euler_span(config), load_per_length(config)
-    entry = -start(config) + (config.guideway.n_spans // 2) * beam.length
+    entry = -course(config).start + (config.guideway.n_spans // 2) * beam.length
     time = passage["t"]
     speed = config.passage.speed
     moving = midspan_deflection(beam, load, config.train.length, speed, time - entry / speed)

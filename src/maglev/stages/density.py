@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, extremes, lost
@@ -59,7 +60,7 @@ def dataset(
     if baseline is not None:
         return of_baseline(config, baseline)
     if design is None or surrogate is None or eev is None:
-        raise ValueError("density: needs a baseline, or a design with its surrogate and eev")
+        raise UserError("density: needs a baseline, or a design with its surrogate and eev")
     return of_surrogate(config, design, surrogate, eev)
 
 
@@ -80,7 +81,7 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If no run held.
     """
     values, away = extremes(runs), lost(runs)
@@ -139,7 +140,7 @@ def of_surrogate(
 
     Raises
     ------
-    ValueError
+    UserError
         If every representative point is likely lost.
 
     References

@@ -22,6 +22,7 @@ from threadpoolctl import threadpool_limits
 
 from maglev import datasets
 from maglev.arrays import FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
@@ -32,7 +33,7 @@ from maglev.stages.reads import RUNS_OF_CASE
 from maglev.stages.runs import content, key_of, runs
 from maglev.uncertainty.adaptive import AdaptiveState, absorb, decision, propose
 from maglev.uncertainty.failure_region import border_batch, fit_failure_region
-from maglev.uncertainty.kriging import fit_kriging
+from maglev.uncertainty.kriging import Kriging, fit_kriging
 from maglev.uncertainty.learning import predicted_limits, tail_batch, taylor_batch
 from maglev.uncertainty.pointset import sobol_points
 from maglev.uncertainty.selection import fit_selected
@@ -87,7 +88,7 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no such case or method, the points are of another case, too few runs hold
         to fit a surrogate, or as `maglev.simulate`.
 
@@ -116,10 +117,10 @@ class _Design:
         n_threads: int,
     ) -> None:
         if method not in ("osm", *ADAPTIVE):
-            raise ValueError(f"method must be osm, asm_paper or asm, got '{method}'")
+            raise UserError(f"method must be osm, asm_paper or asm, got '{method}'")
         missing = {"initial", *(["candidates"] if method in ADAPTIVE else [])} - set(points)
         if missing:
-            raise ValueError(f"the method '{method}' needs the points {', '.join(sorted(missing))}")
+            raise UserError(f"the method '{method}' needs the points {', '.join(sorted(missing))}")
         self.config, self.case, self.method = config, case, method
         self.points, self.store, self.n_threads = points, Path(store), n_threads
         self.settings = getattr(config.study, method)
@@ -127,7 +128,7 @@ class _Design:
         self.inputs = marginals(config, case)
         for name, one in points.items():
             if one.sizes["parameter"] != self.inputs.n:
-                raise ValueError(
+                raise UserError(
                     f"the points '{name}' have {one.sizes['parameter']} random gains, expected "
                     f"{self.inputs.n} as in the case '{case}'"
                 )
@@ -283,6 +284,7 @@ class _Design:
             return taylor_batch(
                 driving, occupied, candidates, n_new, held_probability=held, scores=scores
             )
+        assert isinstance(surrogate, Kriging)  # `fit` of the method asm
         tail = partial(
             tail_batch,
             surrogate,

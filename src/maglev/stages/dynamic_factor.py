@@ -34,7 +34,7 @@ def speeds(config: Config) -> FloatArray:
     """Speeds of the sweep (speed,) [m/s], both ends included where the step divides the range."""
     sweep = config.validation
     n_steps = math.floor((sweep.speed_max - sweep.speed_min) / sweep.speed_step + 1e-9)
-    return sweep.speed_min + sweep.speed_step * np.arange(n_steps + 1)
+    return sweep.speed_min + sweep.speed_step * np.arange(n_steps + 1, dtype=float)
 
 
 def _at_speed(config: Config, speed: float) -> Config:
@@ -75,7 +75,7 @@ def dataset(config: Config, store: str | Path, n_threads: int = 1) -> xr.Dataset
     ------
     ConfigError
         If the measurements cannot be read.
-    ValueError
+    UserError
         As `maglev.simulate`.
     """
     here = measured_here(config)

@@ -31,7 +31,7 @@ def dataset(config: Config, case: str, method: str) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no such case.
     """
     design = getattr(config.study, method)

@@ -64,7 +64,7 @@ def dataset(config: Config) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If a measured profile cannot be read or is shorter than the run.
     """
     irregularity = config.irregularity

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, extremes, lost, population
@@ -50,7 +51,7 @@ def dataset(
     if baseline is not None:
         return of_baseline(config, baseline)
     if design is None or surrogate is None:
-        raise ValueError("limits: needs a baseline, or a design with its surrogate")
+        raise UserError("limits: needs a baseline, or a design with its surrogate")
     return of_surrogate(config, design, surrogate)
 
 
@@ -131,7 +132,7 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
 
     Raises
     ------
-    ValueError
+    UserError
         If all of the population is likely lost.
 
     References
@@ -147,7 +148,7 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
     points = population(config.seed, config.study.n_population, design.sizes["parameter"])
     held = found.held(points)
     if not held.any():
-        raise ValueError(f"all {held.size} points of the population are predicted to be lost")
+        raise UserError(f"all {held.size} points of the population are predicted to be lost")
     predictions = found.surrogate.predict(points[held])
     learnt = loss.region is not None
     losing = {
@@ -212,8 +213,8 @@ def limits_off(
     ]
     return replace(
         plain,
-        lower=np.concatenate([one.lower for one in ends]),
-        upper=np.concatenate([one.upper for one in ends]),
+        lower=np.concatenate([one.interval[0] for one in ends]),
+        upper=np.concatenate([one.interval[1] for one in ends]),
     )
 
 

@@ -59,7 +59,7 @@ def dataset(config: Config, tracks: xr.Dataset) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If too few points of the gains are held on all tracks, or a surrogate cannot be fitted.
 
     References

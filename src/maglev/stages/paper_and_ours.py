@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import lost
@@ -64,11 +65,11 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no baseline among the densities.
     """
     if "mcm" not in density:
-        raise ValueError("the paper's numbers are compared with a baseline, got no 'mcm' density")
+        raise UserError("the paper's numbers are compared with a baseline, got no 'mcm' density")
     names = list(METHODS)
     at = RESPONSES.index(RESPONSE)
     own = {name: one.isel(response=at) for name, one in density.items()}

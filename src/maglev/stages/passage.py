@@ -26,7 +26,7 @@ def dataset(config: Config) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         As `maglev.simulate`.
     """
     return simulate(config, np.array([config.gains.as_row]), histories=True)

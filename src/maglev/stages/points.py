@@ -13,6 +13,7 @@ import xarray as xr
 from scipy.stats import norm
 
 from maglev.arrays import FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.parameters import Case, Config
 from maglev.stages.randomness import generator
 from maglev.uncertainty.distributions import Marginals
@@ -25,11 +26,11 @@ def case_of(config: Config, name: str) -> Case:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no such case.
     """
     if name not in config.cases:
-        raise ValueError(f"there is no case '{name}', known are: {', '.join(config.cases)}")
+        raise UserError(f"there is no case '{name}', known are: {', '.join(config.cases)}")
     return config.cases[name]
 
 
@@ -55,7 +56,7 @@ def marginals(config: Config, case: str) -> Marginals:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no such case.
     """
     chosen = case_of(config, case)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, extremes, lost, method_number
@@ -45,11 +46,11 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If a method has a design and no surrogate, or the other way round.
     """
     if set(design) != set(surrogate):
-        raise ValueError(
+        raise UserError(
             f"every method needs a design and a surrogate, got designs of {sorted(design)} and "
             f"surrogates of {sorted(surrogate)}"
         )

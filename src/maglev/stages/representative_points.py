@@ -29,7 +29,7 @@ def dataset(config: Config, case: str) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no such case.
     """
     found = gf_set(config, case, config.study.n_representative, "representative")

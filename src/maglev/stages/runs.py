@@ -24,6 +24,7 @@ import xarray as xr
 
 from maglev import datasets
 from maglev.arrays import FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
 from maglev.simulation import simulate
@@ -131,17 +132,17 @@ def stored_runs(
 
     Raises
     ------
-    ValueError
+    UserError
         If there are no gains, shapes disagree, or as `maglev.simulate`.
     """
     gains = np.array(gains, dtype=np.float64)
     if gains.ndim != 2 or gains.shape[1] != len(GAINS) or gains.shape[0] == 0:
-        raise ValueError(
+        raise UserError(
             f"gains have shape {gains.shape}, expected (sample, {len(GAINS)}) with at least one row"
         )
     seeds = None if track_seeds is None else np.array(track_seeds, dtype=np.int64)
     if seeds is not None and seeds.shape != gains.shape[:1]:
-        raise ValueError(
+        raise UserError(
             f"track_seeds have shape {seeds.shape}, expected (sample,) = ({gains.shape[0]},)"
         )
     folder, keys = folder_of(config, store), _row_keys(gains, seeds)
@@ -195,7 +196,7 @@ def _refuse_too_large_steps(gains: FloatArray, computed: xr.Dataset) -> None:
     too_fast = np.flatnonzero(computed["status"].to_numpy() == STEP_TOO_LARGE)
     if too_fast.size:
         first = ", ".join(f"{gain:.4g}" for gain in gains[too_fast[0]])
-        raise ValueError(
+        raise UserError(
             f"passage.time_step is too large for the gains of {too_fast.size} of "
             f"{gains.shape[0]} samples, the first with {first}: motions would grow by the step "
             "alone; take a smaller step"
@@ -257,7 +258,7 @@ def runs(
 
     Raises
     ------
-    ValueError
+    UserError
         As `stored_runs`.
     """
     gains = gains_at(config, case, standard)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import extremes, lost
@@ -89,14 +90,14 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no baseline, or a case has limits and no baseline.
     """
     if not baseline:
-        raise ValueError("the check of the statistics needs at least one baseline, got none")
+        raise UserError("the check of the statistics needs at least one baseline, got none")
     strange = sorted({case for case, _ in limits} - set(baseline))
     if strange:
-        raise ValueError(f"the case '{strange[0]}' has limits and no baseline; run its baseline")
+        raise UserError(f"the case '{strange[0]}' has limits and no baseline; run its baseline")
     checks: list[Check] = []
     for case, runs in baseline.items():
         values, away = extremes(runs), lost(runs)
@@ -129,15 +130,14 @@ def _halves(
     middle = away.size // 2
     parts = [slice(0, middle), slice(middle, 2 * middle)]
     if middle == 0 or any(away[part].all() for part in parts):
-        raise ValueError(f"a half of the baseline of '{case}' has no run that held")
+        raise UserError(f"a half of the baseline of '{case}' has no run that held")
     first, second = (baseline_limits(config, values[part], away[part]) for part in parts)
     checks = []
     for response, (a, b) in enumerate(zip(first, second, strict=True)):
         codes = zip(status_numbers(a), status_numbers(b), strict=True)
         for k, (level, code) in enumerate(zip(a.failure_probability, codes, strict=True)):
             lower, upper = (a, b) if a.limit[k] <= b.limit[k] else (b, a)
-            facing = (upper.limit[k] - lower.limit[k], lower.upper[k] - lower.limit[k])
-            reach = facing[1] + upper.limit[k] - upper.lower[k]
+            reach = lower.interval[1][k] - lower.limit[k] + upper.limit[k] - upper.interval[0][k]
             value = _ratio(b.limit[k] - a.limit[k], reach)
             checks.append(_judged(kind, case, "mcm", response, level, value, -1.0, 1.0, code))
     return checks
@@ -161,7 +161,7 @@ def _against(
         for response, truth in enumerate(truths):
             codes = zip(status_numbers(truth), status[response], strict=True)
             for k, (level, code) in enumerate(zip(truth.failure_probability, codes, strict=True)):
-                half = 0.5 * (truth.upper[k] - truth.lower[k])
+                half = truth.half_width[k]
                 value = _ratio(limit[response, k] - truth.limit[k], half)
                 checks.append(_judged(kind, case, method, response, level, value, -1.0, 1.0, code))
     low, high = binomial_interval(float(np.count_nonzero(away)), away.size, config.study.confidence)

@@ -57,7 +57,7 @@ def predictor(config: Config, design: xr.Dataset, choice: str) -> Predictor:
 
     Raises
     ------
-    ValueError
+    UserError
         If no or too few samples held, or they cannot be fitted.
     """
     points, values, away = design["standard"].to_numpy(), extremes(design), lost(design)
@@ -107,7 +107,7 @@ def dataset(config: Config, method: str, design: xr.Dataset) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         As `predictor`.
 
     References

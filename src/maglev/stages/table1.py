@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, method_number
@@ -36,22 +38,22 @@ def dataset(config: Config, limits: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no method, or their failure probabilities differ.
     """
     if not limits:
-        raise ValueError("table 1 needs the limits of at least one method, got none")
+        raise UserError("table 1 needs the limits of at least one method, got none")
     names = sorted(limits, key=METHODS.index)
     levels = limits[names[0]]["failure_probability"].to_numpy()
     for name in names[1:]:
         others = limits[name]["failure_probability"].to_numpy()
         if not np.array_equal(others, levels):
-            raise ValueError(
+            raise UserError(
                 f"limits of '{names[0]}' and '{name}' must be at the same failure probabilities, "
                 f"got {levels} and {others}; compute them again"
             )
     dims = ("method", "response", "failure_probability")
-    variables = {
+    variables: dict[str, tuple[tuple[str, ...], npt.ArrayLike]] = {
         f"table_{name}": (dims, np.stack([limits[one][name].to_numpy() for one in names]))
         for name in _OF_METHOD
     }

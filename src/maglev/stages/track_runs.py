@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Stage
 from maglev.stages.points import baseline, case_of, n_samples, track_seeds
@@ -41,13 +42,13 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no such case or part, or the track of the case is not random.
     """
     if part not in TRACK_PARTS:
-        raise ValueError(f"part must be one of {', '.join(TRACK_PARTS)}, got '{part}'")
+        raise UserError(f"part must be one of {', '.join(TRACK_PARTS)}, got '{part}'")
     if not case_of(config, case).random_track:
-        raise ValueError(f"cases.{case}.random_track must be true for its part '{part}'")
+        raise UserError(f"cases.{case}.random_track must be true for its part '{part}'")
     n = n_samples(config, case)
     standard = baseline(config, case, n, "other gains" if part == "other_gains" else "baseline")
     if part == "track_only":

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
+from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.density import places
@@ -45,7 +47,7 @@ def dataset(
 
     Raises
     ------
-    ValueError
+    UserError
         If sets differ in size, or fewer than two samples held in all of them.
 
     References
@@ -56,7 +58,7 @@ def dataset(
     sizes = {name: part.sizes["sample"] for name, part in parts.items()}
     n = both.sizes["sample"]
     if set(sizes.values()) != {n}:
-        raise ValueError(f"all sets of runs must have {n} samples, got {sizes}; run them again")
+        raise UserError(f"all sets of runs must have {n} samples, got {sizes}; run them again")
     names = ("gains_only", "track_only")
     sets = {"both": both, **{name: parts[name] for name in names}}
     values = {name: extremes(part) for name, part in {"both": both, **parts}.items()}
@@ -82,7 +84,9 @@ def dataset(
             }
         )
         share = pick_freeze_shares(
-            *(values[key][kept, response] for key in ("both", "other_track", "other_gains")),
+            values["both"][kept, response],
+            values["other_track"][kept, response],
+            values["other_gains"][kept, response],
             rng,
             config.study.confidence,
         )
@@ -93,11 +97,13 @@ def dataset(
             *share.first,
             *share.second,
         )
-    columns = {key: (("response", "cell"), np.array([row[key] for row in rows])) for key in rows[0]}
+    columns: dict[str, tuple[tuple[str, ...], FloatArray]] = {
+        key: (("response", "cell"), np.array([row[key] for row in rows])) for key in rows[0]
+    }
     ends = np.array(shares)  # response, share, end
-    for k, name in enumerate(("gains_share", "track_share", "interaction_share")):
+    for k, kind in enumerate(("gains_share", "track_share", "interaction_share")):
         for end, suffix in enumerate(("", "_low", "_high")):
-            columns[f"{name}{suffix}"] = (("response",), ends[:, k, end])
+            columns[f"{kind}{suffix}"] = (("response",), ends[:, k, end])
     result = xr.Dataset(
         {**columns, "n_runs": ((), n * (1 + len(parts)))},
         coords=coordinates(cell=np.arange(columns["value"][1].shape[1])),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Stage
 from maglev.stages.extremes import coordinates, extremes
@@ -39,12 +40,12 @@ def dataset(config: Config, case: str, store: str | Path, n_threads: int = 1) ->
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no such case, its track is not drawn, or as `stored_runs`.
     """
     track = config.irregularity
     if not track.enabled or track.profile_file is not None:
-        raise ValueError(
+        raise UserError(
             "tracks: the irregularity must be drawn from its spectra, got "
             f"{'a measured profile' if track.enabled else 'a smooth track'}, of which there is one"
         )

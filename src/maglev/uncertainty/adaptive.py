@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.uncertainty.surrogate import Fit, Surrogate, checked_points
 
 Batch = Callable[[Surrogate, FloatArray, FloatArray, int], IntArray]
@@ -116,7 +117,7 @@ def absorb(
 
     Raises
     ------
-    ValueError
+    UserError
         If shapes disagree, the batch is empty, values are not finite where the sample held or are
         given where it was lost, a point was run before or twice, or the first design has fewer
         than two samples that held or a constant response.
@@ -131,25 +132,25 @@ def absorb(
     n = points.shape[0]
     lost = np.zeros(n, dtype=bool) if lost is None else np.array(lost)
     if n == 0:
-        raise ValueError("a batch must have at least one point, got none; propose one")
+        raise UserError("a batch must have at least one point, got none; propose one")
     if values.shape != (n, n_responses):
-        raise ValueError(
+        raise UserError(
             f"values have shape {values.shape}, expected (new, response) = ({n}, {n_responses})"
         )
     if lost.dtype != np.bool_ or lost.shape != (n,):
-        raise ValueError(
+        raise UserError(
             f"lost must be {n} booleans, one per point, got {lost.dtype} of shape {lost.shape}"
         )
     wrong = np.flatnonzero(np.where(lost, ~np.isnan(values).all(1), ~np.isfinite(values).all(1)))
     if wrong.size:
         expected = "NaN in every response" if lost[wrong[0]] else "finite values"
-        raise ValueError(
+        raise UserError(
             f"values must be finite where a sample held and NaN where it was lost, got "
             f"{values[wrong[0]]} at point {wrong[0]}, expected {expected}; correct its status"
         )
     together = np.concatenate([state.points, points])
     if np.unique(together, axis=0).shape[0] < together.shape[0]:
-        raise ValueError(
+        raise UserError(
             f"points of a batch must be new, got {together.shape[0]} samples at only "
             f"{np.unique(together, axis=0).shape[0]} different points; a run is never repeated"
         )
@@ -158,20 +159,20 @@ def absorb(
     if predicted is not None:
         predicted = np.array(predicted, dtype=np.float64)
         if predicted.shape != (n, n_responses) or not np.isfinite(predicted).all():
-            raise ValueError(
+            raise UserError(
                 f"predictions must be finite with shape (new, response) = ({n}, {n_responses}), "
                 f"got shape {predicted.shape}"
             )
         first = (state.round_index == 0) & ~state.lost
         if first.sum() < 2:
-            raise ValueError(
+            raise UserError(
                 f"scaling the error needs at least two samples of the first design that held, got "
                 f"{first.sum()}; enlarge the first design"
             )
         scale = state.values[first].std(axis=0)
         level = np.flatnonzero(scale == 0.0)
         if level.size:
-            raise ValueError(
+            raise UserError(
                 f"response {level[0]} must vary over the first design to scale the error, got "
                 f"{state.values[first][0, level[0]]} everywhere; leave it out"
             )
@@ -214,7 +215,7 @@ def propose(
 
     Raises
     ------
-    ValueError
+    UserError
         If the samples that held cannot be fitted or the criterion cannot choose.
     """
     candidates = checked_points(candidates, state.points.shape[1])
@@ -244,11 +245,11 @@ def decision(state: AdaptiveState, *, threshold: float, n_rounds: int, n_largest
 
     Raises
     ------
-    ValueError
+    UserError
         If a setting is not positive.
     """
     if not (threshold > 0.0 and n_rounds >= 1 and n_largest >= 1):
-        raise ValueError(
+        raise UserError(
             "threshold, number of rounds and largest number of runs must be positive, got "
             f"{threshold}, {n_rounds} and {n_largest}"
         )

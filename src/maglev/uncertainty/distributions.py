@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scipy.stats import rv_continuous
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +44,7 @@ class Marginals:
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no input, if one is not a frozen continuous univariate distribution, if a mean
         or deviation is not finite or a deviation not positive, or if inputs are correlated.
     """
@@ -56,10 +57,10 @@ class Marginals:
     def __post_init__(self, correlation: npt.ArrayLike | None) -> None:
         distributions = tuple(self.distributions)
         if not distributions:
-            raise ValueError("Marginals needs at least one distribution, got none")
+            raise UserError("Marginals needs at least one distribution, got none")
         for i, distribution in enumerate(distributions):
             if not isinstance(getattr(distribution, "dist", None), rv_continuous):
-                raise ValueError(
+                raise UserError(
                     f"distribution {i} must be a frozen continuous univariate distribution of "
                     f"scipy.stats such as norm(5000.0, 500.0), got {distribution!r}"
                 )
@@ -67,11 +68,11 @@ class Marginals:
         if correlation is not None:
             matrix = np.asarray(correlation, dtype=float)
             if matrix.shape != (n, n):
-                raise ValueError(
+                raise UserError(
                     f"correlation has shape {matrix.shape}, expected (input, input) = ({n}, {n})"
                 )
             if not np.array_equal(matrix, np.eye(n)):
-                raise ValueError(
+                raise UserError(
                     "inputs must be independent: assigned probabilities and the GF-discrepancy "
                     "are defined here from marginals alone, but the correlation given is not the "
                     "identity; transform the inputs to independent ones first"
@@ -80,7 +81,7 @@ class Marginals:
         deviation = np.array([float(d.std()) for d in distributions])
         for i in range(n):
             if not (np.isfinite(mean[i]) and np.isfinite(deviation[i]) and deviation[i] > 0):
-                raise ValueError(
+                raise UserError(
                     f"distribution {i} must have a finite mean and a finite positive deviation, "
                     f"got mean {mean[i]} and deviation {deviation[i]}"
                 )
@@ -108,7 +109,7 @@ class Marginals:
 
         Raises
         ------
-        ValueError
+        UserError
             If the last axis is not ``input`` or a value is not finite.
         """
         return (self._checked(x, "physical points") - self.mean) / self.deviation
@@ -128,7 +129,7 @@ class Marginals:
 
         Raises
         ------
-        ValueError
+        UserError
             If the last axis is not ``input`` or a value is not finite.
         """
         return self.mean + self.deviation * self._checked(u, "standard points")
@@ -148,20 +149,20 @@ class Marginals:
 
         Raises
         ------
-        ValueError
+        UserError
             If the last axis is not ``input``, a value lies outside [0, 1], or a value of exactly
             0 or 1 would send an unbounded input to infinity.
         """
         c = self._checked(c, "points of the unit cube")
         if np.any((c < 0.0) | (c > 1.0)):
-            raise ValueError(
+            raise UserError(
                 f"points of the unit cube must lie in [0, 1], got {c.min()} to {c.max()}"
             )
         x = np.empty_like(c)
         for i, distribution in enumerate(self.distributions):
             x[..., i] = distribution.ppf(c[..., i])
         if not np.all(np.isfinite(x)):
-            raise ValueError(
+            raise UserError(
                 "points of the unit cube must lie inside (0, 1) where an input is unbounded, "
                 f"got {c.min()} to {c.max()}"
             )
@@ -182,7 +183,7 @@ class Marginals:
 
         Raises
         ------
-        ValueError
+        UserError
             If the last axis is not ``input`` or a value is not finite.
         """
         x = self._checked(x, "physical points")
@@ -194,10 +195,10 @@ class Marginals:
     def _checked(self, points: npt.ArrayLike, what: str) -> FloatArray:
         array = np.asarray(points, dtype=float)
         if array.ndim == 0 or array.shape[-1] != self.n:
-            raise ValueError(f"{what} have shape {array.shape}, expected (..., input = {self.n})")
+            raise UserError(f"{what} have shape {array.shape}, expected (..., input = {self.n})")
         n_bad = np.count_nonzero(~np.isfinite(array))
         if n_bad:
-            raise ValueError(
+            raise UserError(
                 f"{what} must be finite, got {n_bad} values of {array.size} that are not; "
                 "leave those points out"
             )

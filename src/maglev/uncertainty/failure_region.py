@@ -15,6 +15,7 @@ from scipy.stats import binomtest
 from sklearn.linear_model import LogisticRegression
 
 from maglev.arrays import FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.uncertainty._border_kernels import border_chain
 from maglev.uncertainty.surrogate import checked_points
 
@@ -71,7 +72,7 @@ class FailureRegion:
 
         Raises
         ------
-        ValueError
+        UserError
             If ``points`` are not finite or have another number of parameters.
         """
         points = checked_points(points, self.n_parameters)
@@ -97,12 +98,12 @@ class FailureRegion:
 
         Raises
         ------
-        ValueError
+        UserError
             If the population is empty, not finite or has another number of parameters.
         """
         population = checked_points(population, self.n_parameters)
         if population.shape[0] == 0:
-            raise ValueError("a population must have at least one point, got none; draw some")
+            raise UserError("a population must have at least one point, got none; draw some")
         total = np.zeros(self.borders.shape[0])
         for start in range(0, population.shape[0], BLOCK):
             total += self._by_border(population[start : start + BLOCK]).sum(axis=0)
@@ -137,7 +138,7 @@ def fit_failure_region(
 
     Raises
     ------
-    ValueError
+    UserError
         If ``lost`` is not boolean or does not fit, or if all samples held or all were lost.
 
     References
@@ -148,12 +149,12 @@ def fit_failure_region(
     lost = np.asarray(lost)
     n, s = points.shape
     if lost.dtype != np.bool_ or lost.shape != (n,):
-        raise ValueError(
+        raise UserError(
             f"lost must be {n} booleans, one per sample, got {lost.dtype} of shape {lost.shape}"
         )
     n_lost = int(lost.sum())
     if n_lost in (0, n):
-        raise ValueError(
+        raise UserError(
             f"learning a border needs samples on both sides, got {n_lost} lost of {n}; without "
             "any, report the binomial bound of the probability instead"
         )
@@ -227,7 +228,7 @@ def learnt_loss(
 
     Raises
     ------
-    ValueError
+    UserError
         As `fit_failure_region` and `FailureRegion.total_probability`, or if the confidence lies
         outside (0, 1).
 
@@ -237,7 +238,7 @@ def learnt_loss(
     """
     lost = np.asarray(lost)
     if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence must lie in (0, 1), got {confidence}")
+        raise UserError(f"confidence must lie in (0, 1), got {confidence}")
     if lost.size and not lost.any():
         bound = binomtest(0, lost.size).proportion_ci(confidence, "exact")
         return Loss(probability=0.0, lower=0.0, upper=float(bound.high), region=None)
@@ -283,7 +284,7 @@ def border_batch(
 
     Raises
     ------
-    ValueError
+    UserError
         If arrays do not fit or fewer than ``n_new`` candidates are new.
 
     References
@@ -294,7 +295,7 @@ def border_batch(
     candidates = checked_points(candidates, region.n_parameters)
     new = np.flatnonzero(cKDTree(occupied).query(candidates)[0] > 0.0)
     if not 1 <= n_new <= new.size:
-        raise ValueError(
+        raise UserError(
             f"a batch must have between 1 and {new.size} points, as many as there are candidates "
             f"not run yet, got {n_new}; draw more candidates"
         )

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scipy.stats import gaussian_kde, norm
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.uncertainty import _kernels
 from maglev.uncertainty.samples import (
     check_lost_probability,
@@ -51,7 +52,7 @@ _RULE_TOLERANCE = 0.02  # of the bandwidth, well below its own uncertainty, assu
 _CHUNK = 512  # points whose increments are held in memory at once, assumed
 
 
-class _TooManySteps(ValueError):
+class _TooManySteps(UserError):
     """Values far out ask for more than ``MOST_STEPS`` time steps."""
 
 
@@ -157,7 +158,7 @@ def evolved_density(
 
     Raises
     ------
-    ValueError
+    UserError
         If the sample is faulty or constant, an option is unknown, ``mesh`` is not positive,
         ``start`` is not finite, ``lost_probability`` lies outside [0, 1), or values far out ask
         for more than ``MOST_STEPS`` time steps.
@@ -169,13 +170,13 @@ def evolved_density(
     """
     values, probability = weighted_sample(values, probability)
     if process not in ("sine", "linear"):
-        raise ValueError(f"process must be 'sine' or 'linear', got {process!r}")
+        raise UserError(f"process must be 'sine' or 'linear', got {process!r}")
     code = _limiter_code(limiter)
     check_lost_probability(lost_probability)
     if mesh is not None and not (np.isfinite(mesh) and mesh > 0.0):
-        raise ValueError(f"mesh must be positive, got {mesh} standard deviations")
+        raise UserError(f"mesh must be positive, got {mesh} standard deviations")
     if start is not None and not np.isfinite(start):
-        raise ValueError(f"start must be finite, got {start} standard deviations")
+        raise UserError(f"start must be finite, got {start} standard deviations")
     mean, deviation = _moments(values, probability)
     standard = (values - mean) / deviation
     origin = float(standard.min()) - START if start is None else float(start)
@@ -224,7 +225,7 @@ def density_with_strays(
 
     Raises
     ------
-    ValueError
+    UserError
         As `evolved_density` does for a faulty sample.
 
     References
@@ -293,7 +294,7 @@ def direct_density(
 
     Raises
     ------
-    ValueError
+    UserError
         If the sample is faulty or constant, ``bandwidth`` is not positive, a place is not finite
         or ``lost_probability`` lies outside [0, 1).
 
@@ -305,12 +306,12 @@ def direct_density(
     check_lost_probability(lost_probability)
     at = np.asarray(at, dtype=float)
     if at.ndim != 1 or not np.all(np.isfinite(at)):
-        raise ValueError(f"places must be finite and have shape (place,), got shape {at.shape}")
+        raise UserError(f"places must be finite and have shape (place,), got shape {at.shape}")
     mean, deviation = _moments(values, probability)
     if bandwidth is None:
         bandwidth = silverman_bandwidth(values, probability)
     if not (np.isfinite(bandwidth) and bandwidth > 0.0):
-        raise ValueError(f"bandwidth must be positive, got {bandwidth}")
+        raise UserError(f"bandwidth must be positive, got {bandwidth}")
     standard = (values - mean) / deviation
     kernel = gaussian_kde(standard, bw_method=1.0, weights=probability)
     kernel.set_bandwidth(bandwidth / deviation / float(np.sqrt(kernel.covariance[0, 0])))
@@ -387,7 +388,7 @@ def silverman_bandwidth(values: npt.ArrayLike, probability: npt.ArrayLike | None
 
     Raises
     ------
-    ValueError
+    UserError
         If the sample is faulty or constant.
 
     References
@@ -440,7 +441,7 @@ def first_passage(
 
     Raises
     ------
-    ValueError
+    UserError
         If the histories or probabilities are faulty, there is no barrier, a history starts at or
         outside one, or ``mesh`` is not positive.
 
@@ -450,26 +451,26 @@ def first_passage(
     """
     histories = np.asarray(histories, dtype=float)
     if histories.ndim != 2 or histories.shape[0] < 1 or histories.shape[1] < 2:
-        raise ValueError(
+        raise UserError(
             f"histories have shape {histories.shape}, expected (sample, time) with two times or "
             "more"
         )
     if not np.all(np.isfinite(histories)):
-        raise ValueError("histories must be finite, got NaN or infinity; leave lost samples out")
+        raise UserError("histories must be finite, got NaN or infinity; leave lost samples out")
     n = len(histories)
     if probability is None:
         probability = np.full(n, 1.0 / n)
     probability = checked_probability(probability, n)
     code = _limiter_code(limiter)
     if not (np.isfinite(mesh) and mesh > 0.0):
-        raise ValueError(f"mesh must be positive, got {mesh}")
+        raise UserError(f"mesh must be positive, got {mesh}")
     if lower is None and upper is None:
-        raise ValueError("first passage needs a barrier, got neither lower nor upper")
+        raise UserError("first passage needs a barrier, got neither lower nor upper")
     low = -np.inf if lower is None else float(lower)
     high = np.inf if upper is None else float(upper)
     inside = (histories[:, 0] > low) & (histories[:, 0] < high)
     if not inside.all():
-        raise ValueError(
+        raise UserError(
             f"every history must start between the barriers {low} and {high}, got "
             f"{np.count_nonzero(~inside)} of {n} that do not"
         )
@@ -483,7 +484,7 @@ def first_passage(
     n_below = int(np.ceil((face - max(low, histories.min())) / mesh)) + margin
     n_above = int(np.ceil((min(high, histories.max()) - face) / mesh)) + margin
     n_cells = n_below + n_above
-    centre = face + mesh * (np.arange(n_cells) - n_below + 0.5)
+    centre = face + mesh * (np.arange(n_cells, dtype=float) - n_below + 0.5)
     first_kept = n_below if np.isfinite(low) else 0
     past_kept = n_cells
     if np.isfinite(high):
@@ -564,7 +565,7 @@ def _virtual_evolution(
             survival,
             spread[part],
         )
-    centre = start + mesh * (np.arange(n_cells) - n_below)
+    centre = start + mesh * (np.arange(n_cells, dtype=float) - n_below)
     return centre, total, spread, n_steps, farthest * float(np.abs(increment).max())
 
 
@@ -607,7 +608,7 @@ def _moments(values: FloatArray, probability: FloatArray) -> tuple[float, float]
     mean = float(probability @ values)
     deviation = float(np.sqrt(probability @ (values - mean) ** 2))
     if not deviation > 1e-12 * float(np.abs(values).max()):  # rounding of the mean
-        raise ValueError(
+        raise UserError(
             f"values must differ, got {values.size} of the same value {values[0]}: a constant "
             "response has no density"
         )
@@ -616,5 +617,5 @@ def _moments(values: FloatArray, probability: FloatArray) -> tuple[float, float]
 
 def _limiter_code(limiter: str) -> int:
     if limiter not in _LIMITERS:
-        raise ValueError(f"limiter must be one of {', '.join(_LIMITERS)}, got {limiter!r}")
+        raise UserError(f"limiter must be one of {', '.join(_LIMITERS)}, got {limiter!r}")
     return _LIMITERS[limiter]

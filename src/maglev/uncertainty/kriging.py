@@ -14,6 +14,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.uncertainty import _radial_kernels as kernels
 from maglev.uncertainty.surrogate import checked_points, checked_training
 
@@ -81,7 +82,7 @@ class Kriging:
 
         Raises
         ------
-        ValueError
+        UserError
             If ``points`` are not finite or have another number of parameters.
         """
         points = checked_points(points, self.points.shape[1])
@@ -114,7 +115,7 @@ class Kriging:
 
         Raises
         ------
-        ValueError
+        UserError
             If ``points`` are not finite or have another number of parameters.
         """
         points = checked_points(points, self.points.shape[1])
@@ -177,7 +178,7 @@ class Kriging:
 
         Raises
         ------
-        ValueError
+        UserError
             If ``points`` are not finite or have another number of parameters.
         """
         points = checked_points(points, self.points.shape[1])
@@ -209,7 +210,7 @@ class Kriging:
 
         Raises
         ------
-        ValueError
+        UserError
             If points are not finite or have another number of parameters.
         """
         rows = checked_points(rows, self.points.shape[1])
@@ -259,7 +260,7 @@ def fit_kriging(points: npt.ArrayLike, values: npt.ArrayLike) -> Kriging:
 
     Raises
     ------
-    ValueError
+    UserError
         If the training data cannot be used (``checked_training``), or points lie so close that
         the covariance matrix cannot be factorised.
 
@@ -301,7 +302,7 @@ def conditioned_kriging(
 
     Raises
     ------
-    ValueError
+    UserError
         As `fit_kriging`, or if lengths or amplitudes do not fit or are not positive.
 
     References
@@ -318,7 +319,7 @@ def conditioned_kriging(
         ("amplitudes", amplitude, (n_responses,)),
     ):
         if array.shape != shape or not (np.isfinite(array).all() and (array > 0.0).all()):
-            raise ValueError(f"{what} must be positive with shape {shape}, got {array}")
+            raise UserError(f"{what} must be positive with shape {shape}, got {array}")
     weights, factor = np.empty((n, n_responses)), np.empty((n_responses, n, n))
     for response in range(n_responses):
         standardised = (values[:, response] - mean[response]) / deviation[response]
@@ -326,7 +327,7 @@ def conditioned_kriging(
         try:
             process.fit(points, standardised)
         except np.linalg.LinAlgError as error:
-            raise ValueError(
+            raise UserError(
                 f"covariance matrix of response {response} must be positive definite, got one "
                 "that cannot be factorised; remove points that nearly coincide"
             ) from error

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from maglev.arrays import FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.uncertainty.samples import weighted_quantile
 from maglev.uncertainty.surrogate import Surrogate, SurrogateWithDeviation, checked_points
 
@@ -60,7 +61,7 @@ def taylor_scores(
 
     Raises
     ------
-    ValueError
+    UserError
         If the aggregate is unknown or every candidate is a sample already.
 
     References
@@ -71,7 +72,7 @@ def taylor_scores(
     _check_aggregate(aggregate)
     farthest = np.max(distance)
     if not farthest > 0.0:
-        raise ValueError(
+        raise UserError(
             f"all {distance.size} candidates are samples already, expected some that are not; "
             "draw other candidates"
         )
@@ -101,7 +102,7 @@ def taylor_remainder(surrogate: Surrogate, candidates: npt.ArrayLike) -> FloatAr
 
     Raises
     ------
-    ValueError
+    UserError
         If ``candidates`` are not finite or have another number of parameters.
 
     References
@@ -155,7 +156,7 @@ def taylor_batch(
 
     Raises
     ------
-    ValueError
+    UserError
         If the aggregate is unknown, arrays do not fit, or fewer than ``n_new`` candidates are new.
 
     References
@@ -205,7 +206,7 @@ def predicted_limits(
 
     Raises
     ------
-    ValueError
+    UserError
         If a probability does not lie between 0 and 1.
     """
     values = np.asarray(values, float)
@@ -213,9 +214,9 @@ def predicted_limits(
     held = np.ones(n) if held_probability is None else np.asarray(held_probability, float)
     levels = np.asarray(exceedances, float)
     if levels.ndim != 1 or not ((levels > 0.0) & (levels < 1.0)).all():
-        raise ValueError(f"exceedances must lie between 0 and 1, got {exceedances}")
+        raise UserError(f"exceedances must lie between 0 and 1, got {exceedances}")
     if held.shape != (n,) or not ((held >= 0.0) & (held <= 1.0)).all():
-        raise ValueError(
+        raise UserError(
             f"held_probability must be {n} numbers between 0 and 1, one per point, got shape "
             f"{held.shape}"
         )
@@ -268,7 +269,7 @@ def tail_batch(
 
     Raises
     ------
-    ValueError
+    UserError
         If the surrogate has no covariance, the aggregate is unknown, arrays do not fit, or fewer
         than ``n_new`` candidates are new.
 
@@ -278,7 +279,7 @@ def tail_batch(
     Technometrics 56 (2014) 455–465 (batches); docs/theory/adaptive_sampling.md.
     """
     if not hasattr(surrogate, "covariance"):
-        raise ValueError(
+        raise UserError(
             f"the tail criterion needs a surrogate with a covariance, got "
             f"{type(surrogate).__name__}; use Kriging or the Taylor criterion"
         )
@@ -374,14 +375,14 @@ def _checked(
     n = candidates.shape[0]
     held = np.ones(n) if held_probability is None else np.asarray(held_probability, float)
     if held.shape != (n,) or not ((held >= 0.0) & (held <= 1.0)).all():
-        raise ValueError(
+        raise UserError(
             f"held_probability must be {n} numbers between 0 and 1, one per candidate, got shape "
             f"{held.shape}"
         )
     distance = cKDTree(occupied).query(candidates)[0]
     n_distinct = np.unique(candidates[distance > 0.0], axis=0).shape[0]
     if not 1 <= n_new <= n_distinct:
-        raise ValueError(
+        raise UserError(
             f"a batch must have between 1 and {n_distinct} points, as many as there are candidates "
             f"not run yet, got {n_new}; draw more candidates"
         )
@@ -390,7 +391,7 @@ def _checked(
 
 def _check_aggregate(aggregate: str) -> None:
     if aggregate not in AGGREGATES:
-        raise ValueError(f"aggregate must be one of {', '.join(AGGREGATES)}, got '{aggregate}'")
+        raise UserError(f"aggregate must be one of {', '.join(AGGREGATES)}, got '{aggregate}'")
 
 
 def _diameter(points: FloatArray) -> float:

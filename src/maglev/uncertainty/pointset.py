@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.uncertainty.distributions import Marginals
 
 COUNTING_POINTS = 2**20
@@ -84,7 +85,7 @@ def gf_points(
 
     Raises
     ------
-    ValueError
+    UserError
         If ``n`` is less than two or ``counting`` is not a power of two of at least ``n``.
 
     Warns
@@ -133,7 +134,7 @@ def sobol_points(marginals: Marginals, n: int, rng: np.random.Generator) -> Poin
 
     Raises
     ------
-    ValueError
+    UserError
         If ``n`` is less than two.
 
     References
@@ -166,7 +167,7 @@ def rearranged(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Margina
 
     Raises
     ------
-    ValueError
+    UserError
         If shapes disagree, a value is not finite, a weight is not positive, the weights do not
         sum to one, or two points share the value of an input.
 
@@ -179,7 +180,7 @@ def rearranged(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Margina
     order = np.argsort(points, axis=0)
     ties = np.diff(np.take_along_axis(points, order, axis=0), axis=0) == 0.0
     if ties.any():
-        raise ValueError(
+        raise UserError(
             f"input {int(np.flatnonzero(ties.any(axis=0))[0])} has the same value at several "
             "points, expected distinct values; remove duplicate points before rearranging"
         )
@@ -223,7 +224,7 @@ def voronoi_probability(
 
     Raises
     ------
-    ValueError
+    UserError
         If two points coincide or ``counting`` is not a power of two of at least their number.
 
     Warns
@@ -238,12 +239,12 @@ def voronoi_probability(
     standard = marginals.to_standard(points)
     n = len(standard)
     if len(np.unique(standard, axis=0)) < n:
-        raise ValueError(
+        raise UserError(
             f"points must be distinct, got {n - len(np.unique(standard, axis=0))} duplicates "
             f"among {n}; a duplicate's Voronoi cell is not defined, remove it"
         )
     if counting < n or counting & (counting - 1):
-        raise ValueError(
+        raise UserError(
             f"counting points must be a power of two of at least the {n} points, got {counting}; "
             f"use {COUNTING_POINTS}"
         )
@@ -289,7 +290,7 @@ def gf_discrepancy(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Mar
 
     Raises
     ------
-    ValueError
+    UserError
         If shapes disagree, a value is not finite, a weight is not positive or the weights do not
         sum to one.
 
@@ -332,7 +333,7 @@ def _equal_weights(unit: FloatArray, marginals: Marginals) -> PointSet:
 
 def _check_size(n: int) -> None:
     if n < 2:
-        raise ValueError(f"a point set needs at least 2 points, got {n}")
+        raise UserError(f"a point set needs at least 2 points, got {n}")
 
 
 def _checked_points(
@@ -340,16 +341,16 @@ def _checked_points(
 ) -> tuple[FloatArray, FloatArray]:
     points, weights = np.asarray(points, dtype=float), np.asarray(weights, dtype=float)
     if points.ndim != 2 or points.shape[1] != marginals.n or weights.shape != points.shape[:1]:
-        raise ValueError(
+        raise UserError(
             f"points and weights have shapes {points.shape} and {weights.shape}, expected "
             f"(sample, input = {marginals.n}) and (sample,)"
         )
     if not np.all(np.isfinite(points)):
-        raise ValueError("points must be finite, got NaN or infinity; leave those points out")
+        raise UserError("points must be finite, got NaN or infinity; leave those points out")
     if not np.all(weights > 0.0):
-        raise ValueError(f"weights must be positive, got {np.min(weights)} as the smallest")
+        raise UserError(f"weights must be positive, got {np.min(weights)} as the smallest")
     if abs(weights.sum() - 1.0) > 1e-9:  # far above rounding, far below one counted point
-        raise ValueError(
+        raise UserError(
             f"weights must sum to 1, got {weights.sum()}; divide them by their sum if the rest "
             "was left out on purpose"
         )

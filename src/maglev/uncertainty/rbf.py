@@ -12,6 +12,7 @@ from scipy.linalg import LinAlgError, LinAlgWarning, lu_factor, lu_solve
 from scipy.optimize import minimize, minimize_scalar
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 from maglev.uncertainty import _radial_kernels as kernels
 from maglev.uncertainty.surrogate import checked_points, checked_training
 
@@ -85,7 +86,7 @@ class RBF:
 
         Raises
         ------
-        ValueError
+        UserError
             If ``points`` are not finite or have another number of parameters.
         """
         points = checked_points(points, self.points.shape[1])
@@ -115,7 +116,7 @@ class RBF:
 
         Raises
         ------
-        ValueError
+        UserError
             If ``points`` are not finite or have another number of parameters.
         """
         points = checked_points(points, self.points.shape[1])
@@ -142,7 +143,7 @@ class RBF:
 
         Raises
         ------
-        ValueError
+        UserError
             If the remaining points could not carry the linear tail.
 
         References
@@ -220,7 +221,7 @@ def fit_rbf(
 
     Raises
     ------
-    ValueError
+    UserError
         If the training data cannot be used (``checked_training``), the basis is unknown, shape or
         length are not positive or not wanted, or the saddle matrix is singular or its condition
         number exceeds ``LARGEST_CONDITION``.
@@ -232,12 +233,12 @@ def fit_rbf(
     points, values = checked_training(points, values)
     n_parameters = points.shape[1]
     if basis not in BASES:
-        raise ValueError(f"radial basis must be one of {', '.join(BASES)}, got '{basis}'")
+        raise UserError(f"radial basis must be one of {', '.join(BASES)}, got '{basis}'")
     if shape is not None and basis not in SHAPED:
-        raise ValueError(f"the {basis} basis has no shape parameter, got {shape}; leave it out")
+        raise UserError(f"the {basis} basis has no shape parameter, got {shape}; leave it out")
     length = np.ones(n_parameters) if length is None else np.array(length, dtype=np.float64)
     if length.shape != (n_parameters,) or not (np.isfinite(length).all() and (length > 0).all()):
-        raise ValueError(
+        raise UserError(
             f"lengths must be {n_parameters} positive numbers, one per parameter, got {length}"
         )
     if shape is None:
@@ -245,7 +246,7 @@ def fit_rbf(
         if basis in SHAPED:
             shape = _shape_by_leave_one_out(points, values, basis, length)
     if not (np.isfinite(shape) and shape > 0.0):
-        raise ValueError(f"shape parameter must be positive, got {shape}")
+        raise UserError(f"shape parameter must be positive, got {shape}")
     return _solved(points, values, basis, float(shape), length)
 
 
@@ -274,7 +275,7 @@ def fit_scaled_rbf(
 
     Raises
     ------
-    ValueError
+    UserError
         As ``fit_rbf``, or if there are too few points to leave one out.
     """
     points, values = checked_training(points, values)
@@ -339,7 +340,7 @@ def _solved(
     matrix, size = _saddle_matrix(points, basis, shape, length)
     factor, inverse, condition = _inverse(matrix)
     if not condition <= LARGEST_CONDITION:
-        raise ValueError(
+        raise UserError(
             f"condition number of the {basis} interpolation system must not exceed "
             f"{LARGEST_CONDITION:.0e}, got {condition:.1e} with shape {shape:.3g}; "
             "remove points that nearly coincide, or take a larger shape or the cubic basis"
@@ -364,14 +365,14 @@ def _leave_one_out(
     """Residuals e_k = λ_k / (A⁻¹)_kk (sample, response)."""
     n, s = points.shape
     if n < s + 2:
-        raise ValueError(
+        raise UserError(
             f"leaving one point out of a linear tail in {s} parameters needs at least {s + 2} "
             f"points, got {n}; add training points"
         )
     # (A⁻¹)_kk is zero, but for rounding, when only sample k spans some direction
     needed = np.flatnonzero(np.abs(inverse_diagonal) <= 1e-13 * np.max(np.abs(inverse_diagonal)))
     if needed.size:
-        raise ValueError(
+        raise UserError(
             f"leave-one-out needs points that span all {s} parameters without any one of them, "
             f"got sample {needed[0]} alone off a plane; add training points"
         )
@@ -403,7 +404,7 @@ def _shape_by_leave_one_out(
     trial = np.log(np.geomspace(*SHAPE_RANGE, 25) / neighbour)  # a quarter of an octave or so
     errors = np.array([error(log_shape) for log_shape in trial])
     if not np.isfinite(errors).any():
-        raise ValueError(
+        raise UserError(
             f"no shape parameter of the {basis} basis between {np.exp(trial[0]):.2g} and "
             f"{np.exp(trial[-1]):.2g} keeps the condition number below "
             f"{LARGEST_CONDITION:.0e}; remove points that nearly coincide or take the cubic basis"
@@ -452,7 +453,7 @@ def _length_by_leave_one_out(
     errors = [error(np.log(start))[0] for start in starts]
     start = np.log(starts[int(np.argmin(errors))])
     if not np.isfinite(min(errors)):
-        raise ValueError(
+        raise UserError(
             f"the {basis} interpolation system exceeds a condition number of "
             f"{LARGEST_CONDITION:.0e} at every length tried first; remove points that nearly "
             "coincide or take the cubic basis"

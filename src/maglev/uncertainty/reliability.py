@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.uncertainty.samples import (
     check_lost_probability,
     weight_beyond,
@@ -64,6 +65,25 @@ class Limits:
     status: tuple[str, ...]
     confidence: float | None
 
+    @property
+    def interval(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper ends (level,) of the interval.
+
+        Raises
+        ------
+        UserError
+            If the limits carry no interval.
+        """
+        if self.lower is None or self.upper is None:
+            raise UserError("the limits carry no interval; find them from independent runs")
+        return self.lower, self.upper
+
+    @property
+    def half_width(self) -> FloatArray:
+        """Half the interval (level,) [unit]."""
+        lower, upper = self.interval
+        return 0.5 * (upper - lower)
+
 
 def exceedance(
     at: npt.ArrayLike,
@@ -94,7 +114,7 @@ def exceedance(
 
     Raises
     ------
-    ValueError
+    UserError
         If the sample is faulty, a place is NaN or ``lost_probability`` lies outside [0, 1).
 
     References
@@ -139,7 +159,7 @@ def sample_limits(
 
     Raises
     ------
-    ValueError
+    UserError
         If the sample is faulty, a level or the confidence lies outside (0, 1), or ``n_lost`` is
         negative.
 
@@ -151,7 +171,7 @@ def sample_limits(
     levels = _checked_levels(failure_probability)
     _check_confidence(confidence)
     if n_lost < 0:
-        raise ValueError(f"the number of lost samples must be zero or positive, got {n_lost}")
+        raise UserError(f"the number of lost samples must be zero or positive, got {n_lost}")
     n = values.size + n_lost
     ranked = np.concatenate((np.sort(values), np.full(n_lost, np.inf)))
     expected = n * levels - n_lost
@@ -220,7 +240,7 @@ def surrogate_limits(
 
     Raises
     ------
-    ValueError
+    UserError
         If the predictions are faulty, not exactly one of ``residuals``, ``standard_deviation`` and
         ``error_range`` is given, it is faulty, there are too few residuals for the confidence, a
         level or the confidence lies outside (0, 1), or the loss probabilities are out of range or
@@ -240,13 +260,13 @@ def surrogate_limits(
         lost_interval = (lost_probability, lost_probability)
     fewest, most = lost_interval
     if not 0.0 <= fewest <= lost_probability <= most < 1.0:
-        raise ValueError(
+        raise UserError(
             f"the interval of the lost probability must hold it within [0, 1), got {fewest} to "
             f"{most} around {lost_probability}"
         )
     given_errors = [one is not None for one in (residuals, standard_deviation, error_range)]
     if sum(given_errors) != 1:
-        raise ValueError(
+        raise UserError(
             "the surrogate's error must be given as either residuals or standard_deviation or "
             f"error_range, got {('neither', 'one', 'both', 'all three')[sum(given_errors)]}"
         )
@@ -257,16 +277,16 @@ def surrogate_limits(
     elif error_range is not None:
         low, high = error_range
         if not (np.isfinite(low) and np.isfinite(high) and low <= high):
-            raise ValueError(f"the range of errors must be finite and ascend, got {low} to {high}")
+            raise UserError(f"the range of errors must be finite and ascend, got {low} to {high}")
     else:
         spread = np.asarray(standard_deviation, dtype=float)
         if spread.shape != predictions.shape:
-            raise ValueError(
+            raise UserError(
                 f"standard deviations have shape {spread.shape}, expected that of the "
                 f"predictions, {predictions.shape}"
             )
         if not np.all(np.isfinite(spread) & (spread >= 0.0)):
-            raise ValueError("standard deviations must be finite and zero or positive")
+            raise UserError("standard deviations must be finite and zero or positive")
         high = float(stats.norm.ppf(0.5 + 0.5 * confidence)) * spread
         low = -high
     n = predictions.size
@@ -323,7 +343,7 @@ def clustered_limits(
 
     Raises
     ------
-    ValueError
+    UserError
         If there are fewer than two clusters, a value is not finite, or a level or the confidence
         lies outside (0, 1).
 
@@ -336,7 +356,7 @@ def clustered_limits(
     levels = _checked_levels(failure_probability)
     _check_confidence(confidence)
     if values.ndim != 2 or values.shape[0] < 2 or values.shape[1] < 1:
-        raise ValueError(
+        raise UserError(
             f"values have shape {values.shape}, expected (cluster, sample) with at least two "
             "clusters"
         )
@@ -406,7 +426,7 @@ def error_range_near(
 
     Raises
     ------
-    ValueError
+    UserError
         If shapes disagree, something is not finite, there are fewer than two samples, or the
         confidence lies outside (0, 1).
 
@@ -419,12 +439,12 @@ def error_range_near(
     _check_confidence(confidence)
     n = values.size
     if values.ndim != 1 or residuals.shape != values.shape or n < 2:
-        raise ValueError(
+        raise UserError(
             f"values and residuals have shapes {values.shape} and {residuals.shape}, expected "
             "(training,) twice, with two samples or more"
         )
     if not (np.isfinite(values).all() and np.isfinite(residuals).all()):
-        raise ValueError("values and residuals must be finite, got NaN or infinity among them")
+        raise UserError("values and residuals must be finite, got NaN or infinity among them")
     n_near = _fewest_residuals(confidence)
     if n < n_near:
         quantile = stats.t.ppf(0.5 + 0.5 * confidence, n - 1)
@@ -478,13 +498,13 @@ def _residual_quantiles(residuals: npt.ArrayLike, confidence: float) -> tuple[fl
     """Conservative lower and upper quantile of leave-one-out residuals, by rank of n + 1."""
     residuals = np.asarray(residuals, dtype=float)
     if residuals.ndim != 1 or not np.all(np.isfinite(residuals)):
-        raise ValueError(
+        raise UserError(
             f"residuals must be finite and have shape (training,), got shape {residuals.shape}"
         )
     n = residuals.size
     rank = int(np.floor(0.5 * (1.0 - confidence) * (n + 1) * (1.0 + _ROUNDING)))
     if rank < 1:
-        raise ValueError(
+        raise UserError(
             f"a confidence of {confidence} needs at least {_fewest_residuals(confidence)} "
             f"residuals, got {n}; train on more points or lower the confidence"
         )
@@ -507,17 +527,17 @@ def _status(expected: FloatArray, lost: BoolArray) -> tuple[str, ...]:
 def _checked_levels(failure_probability: npt.ArrayLike) -> FloatArray:
     levels = np.atleast_1d(np.asarray(failure_probability, dtype=float))
     if levels.ndim != 1 or not np.all((levels > 0.0) & (levels < 1.0)):
-        raise ValueError(f"failure probabilities must lie in (0, 1), got {failure_probability}")
+        raise UserError(f"failure probabilities must lie in (0, 1), got {failure_probability!r}")
     return levels
 
 
 def _checked_places(at: npt.ArrayLike) -> FloatArray:
     at = np.atleast_1d(np.asarray(at, dtype=float))
     if at.ndim != 1 or np.any(np.isnan(at)):
-        raise ValueError(f"places must have shape (place,) and not be NaN, got shape {at.shape}")
+        raise UserError(f"places must have shape (place,) and not be NaN, got shape {at.shape}")
     return at
 
 
 def _check_confidence(confidence: float) -> None:
     if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence must lie in (0, 1), got {confidence}")
+        raise UserError(f"confidence must lie in (0, 1), got {confidence}")

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 
 SUM_TOLERANCE = 1e-9
 """How far probabilities may sum from one: far above rounding, far below one point's. Assumed."""
@@ -101,16 +102,16 @@ def weighted_sample(
 
     Raises
     ------
-    ValueError
+    UserError
         If there is no value, a shape is wrong, a value is not finite, a probability is negative
         or they do not sum to one.
     """
     values = np.asarray(values, dtype=float)
     if values.ndim != 1 or values.size == 0:
-        raise ValueError(f"values have shape {values.shape}, expected (sample,) with one or more")
+        raise UserError(f"values have shape {values.shape}, expected (sample,) with one or more")
     n_bad = np.count_nonzero(~np.isfinite(values))
     if n_bad:
-        raise ValueError(
+        raise UserError(
             f"values must be finite, got {n_bad} of {values.size} that are not; take lost samples "
             "out with held_part first"
         )
@@ -136,20 +137,20 @@ def checked_probability(probability: npt.ArrayLike, n: int) -> FloatArray:
 
     Raises
     ------
-    ValueError
+    UserError
         If their number is not ``n``, one is negative or NaN, or they do not sum to one.
     """
     probability = np.asarray(probability, dtype=float)
     if probability.shape != (n,):
-        raise ValueError(
+        raise UserError(
             f"probabilities have shape {probability.shape}, expected (sample,) = ({n},)"
         )
     if not np.all(probability >= 0.0):
-        raise ValueError(
+        raise UserError(
             f"probabilities must be zero or positive, got {np.min(probability)} as the smallest"
         )
     if abs(probability.sum() - 1.0) > SUM_TOLERANCE:
-        raise ValueError(
+        raise UserError(
             f"probabilities must sum to 1, got {probability.sum()}; if lost samples were left "
             "out, let held_part do it"
         )
@@ -166,11 +167,11 @@ def check_lost_probability(lost_probability: float) -> None:
 
     Raises
     ------
-    ValueError
+    UserError
         If it lies outside [0, 1).
     """
     if not 0.0 <= lost_probability < 1.0:
-        raise ValueError(f"lost probability must lie in [0, 1), got {lost_probability}")
+        raise UserError(f"lost probability must lie in [0, 1), got {lost_probability}")
 
 
 def held_part(
@@ -194,7 +195,7 @@ def held_part(
 
     Raises
     ------
-    ValueError
+    UserError
         If shapes disagree, ``lost`` is not boolean, no sample is held, a held value is not finite
         or the probabilities do not sum to one.
 
@@ -204,19 +205,19 @@ def held_part(
     """
     values, lost = np.asarray(values, dtype=float), np.asarray(lost)
     if values.ndim != 1 or lost.shape != values.shape or lost.dtype != np.bool_:
-        raise ValueError(
+        raise UserError(
             f"values and lost have shapes {values.shape} and {lost.shape} and lost has type "
             f"{lost.dtype}, expected (sample,) twice and bool"
         )
     if lost.all():
-        raise ValueError(f"at least one sample must be held, got {lost.size} lost of {lost.size}")
+        raise UserError(f"at least one sample must be held, got {lost.size} lost of {lost.size}")
     if probability is None:
         probability = np.full(values.size, 1.0 / values.size)
     probability = checked_probability(probability, values.size)
     held_values, _ = weighted_sample(values[~lost])
     held_probability = probability[~lost].sum()
     if held_probability == 0.0:
-        raise ValueError("the held samples must have a positive probability, got 0 in total")
+        raise UserError("the held samples must have a positive probability, got 0 in total")
     return HeldPart(
         values=held_values,
         probability=probability[~lost] / held_probability,

@@ -6,12 +6,14 @@ they make the same surrogate again, without a search.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from maglev.arrays import FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.uncertainty.kriging import Kriging, conditioned_kriging, fit_kriging
 from maglev.uncertainty.rbf import RBF, ScaledRBF, fit_rbf, fit_scaled_rbf
 from maglev.uncertainty.surrogate import best_by_leave_one_out, checked_training
@@ -20,7 +22,11 @@ from maglev.vocabulary import SURROGATES
 CHOICES = (*SURROGATES, "best")
 """What can be asked for: one kind for all responses, or the best of all for each."""
 
-_FITS = {"rbf": fit_rbf, "scaled_rbf": fit_scaled_rbf, "kriging": fit_kriging}
+_FITS: dict[str, Callable[[FloatArray, FloatArray], RBF | ScaledRBF | Kriging]] = {
+    "rbf": fit_rbf,
+    "scaled_rbf": fit_scaled_rbf,
+    "kriging": fit_kriging,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +107,7 @@ def fit_selected(points: npt.ArrayLike, values: npt.ArrayLike, choice: str) -> S
 
     Raises
     ------
-    ValueError
+    UserError
         If the choice is unknown or the training data cannot be used.
 
     References
@@ -109,7 +115,7 @@ def fit_selected(points: npt.ArrayLike, values: npt.ArrayLike, choice: str) -> S
     docs/theory/surrogates.md, sec. 5.
     """
     if choice not in CHOICES:
-        raise ValueError(f"surrogate must be one of {', '.join(CHOICES)}, got '{choice}'")
+        raise UserError(f"surrogate must be one of {', '.join(CHOICES)}, got '{choice}'")
     points, values = checked_training(points, values)
     fitted: dict[str, RBF | ScaledRBF | Kriging] = {}
     for kind in SURROGATES if choice == "best" else (choice,):
@@ -117,7 +123,7 @@ def fit_selected(points: npt.ArrayLike, values: npt.ArrayLike, choice: str) -> S
             fitted[kind] = _FITS[kind](points, values)
             if choice == "best":
                 fitted[kind].leave_one_out()
-        except ValueError:
+        except (UserError, np.linalg.LinAlgError):
             fitted.pop(kind, None)
             if choice != "best" or (kind == SURROGATES[-1] and not fitted):
                 raise
@@ -154,18 +160,18 @@ def rebuilt(
 
     Raises
     ------
-    ValueError
+    UserError
         If a kind is unknown, shapes disagree or the training data cannot be used.
     """
     points, values = checked_training(points, values)
     length, amplitude = np.array(length, dtype=float), np.array(amplitude, dtype=float)
     n_responses = values.shape[1]
     if len(kinds) != n_responses or not set(kinds) <= set(SURROGATES):
-        raise ValueError(
+        raise UserError(
             f"kinds must be {n_responses} of {', '.join(SURROGATES)}, one per response, got {kinds}"
         )
     if length.shape != (n_responses, points.shape[1]) or amplitude.shape != (n_responses,):
-        raise ValueError(
+        raise UserError(
             f"lengths and amplitudes have shapes {length.shape} and {amplitude.shape}, expected "
             f"(response, parameter) = ({n_responses}, {points.shape[1]}) and ({n_responses},)"
         )

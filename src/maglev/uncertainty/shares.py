@@ -10,6 +10,7 @@ from scipy import special, stats
 from scipy.stats import bootstrap
 
 from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.errors import UserError
 
 N_RESAMPLES = 999
 """Bootstrap samples behind an interval; assumed, SciPy's own choice for such intervals."""
@@ -61,7 +62,7 @@ def pick_freeze_shares(
 
     Raises
     ------
-    ValueError
+    UserError
         If shapes disagree, there are fewer than two samples, a value is not finite, all are equal
         or the confidence lies outside (0, 1).
 
@@ -72,15 +73,15 @@ def pick_freeze_shares(
     """
     runs = np.array([np.asarray(one, dtype=float) for one in (values, same_first, same_second)])
     if runs.ndim != 2 or runs.shape[1] < 2:
-        raise ValueError(
+        raise UserError(
             f"pick-freeze runs have shape {runs.shape[1:]}, expected (sample,) with two or more"
         )
     if not np.isfinite(runs).all():
-        raise ValueError("pick-freeze runs must be finite; leave samples with a lost run out")
+        raise UserError("pick-freeze runs must be finite; leave samples with a lost run out")
     if np.ptp(runs) == 0.0:
-        raise ValueError(f"pick-freeze runs must differ, got {runs[0, 0]} everywhere")
+        raise UserError(f"pick-freeze runs must differ, got {runs[0, 0]} everywhere")
     if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence must lie in (0, 1), got {confidence}")
+        raise UserError(f"confidence must lie in (0, 1), got {confidence}")
     runs = (runs - runs[0].mean()) / runs[0].std()  # no cancellation
 
     def shares(chosen: IntArray, axis: int = -1) -> FloatArray:
@@ -135,7 +136,7 @@ def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
 
     Raises
     ------
-    ValueError
+    UserError
         If there are fewer than three second or two first inputs, a value is not finite, all are
         equal or the confidence lies outside (0, 1).
 
@@ -144,22 +145,22 @@ def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
     Searle, Casella, McCulloch, Variance Components (1992), sec. 4.3; Arvesen, Schmitz, Biometrics
     26 (1970) 677-686, for the jackknife; docs/theory/reliability.md, eqs. (14) and (15).
     """
-    values = np.asarray(values, dtype=float)
-    if values.ndim != 2 or values.shape[0] < 3 or values.shape[1] < 2:
-        raise ValueError(
-            f"crossed runs have shape {values.shape}, expected (second, first) with at least three "
+    runs = np.asarray(values, dtype=float)
+    if runs.ndim != 2 or runs.shape[0] < 3 or runs.shape[1] < 2:
+        raise UserError(
+            f"crossed runs have shape {runs.shape}, expected (second, first) with at least three "
             "second and two first inputs"
         )
-    if not np.isfinite(values).all():
-        raise ValueError("crossed runs must be finite; leave inputs with a lost run out")
-    if np.ptp(values) == 0.0:
-        raise ValueError(f"crossed runs must differ, got {values[0, 0]} everywhere")
+    if not np.isfinite(runs).all():
+        raise UserError("crossed runs must be finite; leave inputs with a lost run out")
+    if np.ptp(runs) == 0.0:
+        raise UserError(f"crossed runs must differ, got {runs[0, 0]} everywhere")
     if not 0.0 < confidence < 1.0:
-        raise ValueError(f"confidence must lie in (0, 1), got {confidence}")
-    values = (values - values.mean()) / values.std()  # no cancellation
-    whole = _component_shares(values)
+        raise UserError(f"confidence must lie in (0, 1), got {confidence}")
+    runs = (runs - runs.mean()) / runs.std()  # no cancellation
+    whole = _component_shares(runs)
     left_out = [
-        np.array([_component_shares(np.delete(values, k, axis)) for k in range(values.shape[axis])])
+        np.array([_component_shares(np.delete(runs, k, axis)) for k in range(runs.shape[axis])])
         for axis in (0, 1)
     ]
     inside = np.logical_and.reduce(
@@ -170,7 +171,7 @@ def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
     for without in left_out:
         each, n = _logit_where(inside, without), without.shape[0]
         variance += (n - 1) / n * np.square(each - each.mean(axis=0)).sum(axis=0)
-    half = stats.t.ppf(0.5 + 0.5 * confidence, values.shape[0] - 1) * np.sqrt(variance)
+    half = stats.t.ppf(0.5 + 0.5 * confidence, runs.shape[0] - 1) * np.sqrt(variance)
     ends = [np.where(inside, special.expit(one), one) for one in (at - half, at + half)]
     found = np.array([whole, *ends])
     return Shares(first=found[:, 0], second=found[:, 1], interaction=found[:, 2])

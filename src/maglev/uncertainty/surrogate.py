@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from maglev.arrays import FloatArray
+from maglev.errors import UserError
 
 
 class Surrogate(Protocol):
@@ -63,19 +64,19 @@ def checked_points(points: npt.ArrayLike, n_parameters: int | None = None) -> Fl
 
     Raises
     ------
-    ValueError
+    UserError
         If the shape is another one or a coordinate is not finite.
     """
     array = np.ascontiguousarray(points, dtype=np.float64)
     expected = "any" if n_parameters is None else n_parameters
     if array.ndim != 2 or (n_parameters is not None and array.shape[1] != n_parameters):
-        raise ValueError(
+        raise UserError(
             f"points have shape {array.shape}, expected (point, parameter) = (any, {expected}); "
             "give one row per point"
         )
     unusable = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if unusable.size:
-        raise ValueError(
+        raise UserError(
             f"points must be finite, got {unusable.size} of {array.shape[0]} that are not; "
             f"first is point {unusable[0]}: leave them out or correct them"
         )
@@ -101,7 +102,7 @@ def checked_training(points: npt.ArrayLike, values: npt.ArrayLike) -> tuple[Floa
 
     Raises
     ------
-    ValueError
+    UserError
         If shapes disagree, something is not finite, two points coincide, a response is constant,
         or there are fewer points than a linear tail needs.
     """
@@ -111,18 +112,18 @@ def checked_training(points: npt.ArrayLike, values: npt.ArrayLike) -> tuple[Floa
         values = values[:, None]
     n, s = points.shape
     if values.ndim != 2 or values.shape[0] != n or values.shape[1] == 0:
-        raise ValueError(
+        raise UserError(
             f"values have shape {values.shape}, expected (sample, response) = ({n}, at least 1); "
             "give one row per training point"
         )
     unusable = np.flatnonzero(~np.isfinite(values).all(axis=1))
     if unusable.size:
-        raise ValueError(
+        raise UserError(
             f"training values must be finite, got {unusable.size} of {n} samples that are not; "
             f"first is sample {unusable[0]}: a lost sample never enters a regression, leave it out"
         )
     if n < s + 1:
-        raise ValueError(
+        raise UserError(
             f"a linear tail in {s} parameters needs at least {s + 1} points, got {n}; "
             "add training points"
         )
@@ -130,19 +131,19 @@ def checked_training(points: npt.ArrayLike, values: npt.ArrayLike) -> tuple[Floa
     same = np.flatnonzero((np.diff(points[order], axis=0) == 0.0).all(axis=1))
     if same.size:
         first, second = sorted(order[same[0] : same[0] + 2])
-        raise ValueError(
+        raise UserError(
             f"training points must be distinct, got the same point as samples {first} and "
             f"{second}; leave one of them out"
         )
     rank = np.linalg.matrix_rank(np.column_stack([np.ones(n), points]))
     if rank < s + 1:
-        raise ValueError(
+        raise UserError(
             f"training points must span all {s} parameters, got points that span only "
             f"{rank - 1}; add points off that plane or drop the parameter that does not vary"
         )
     constant = np.flatnonzero(np.ptp(values, axis=0) == 0.0)
     if constant.size:
-        raise ValueError(
+        raise UserError(
             f"every response must vary, got {values[0, constant[0]]} at all {n} points for "
             f"response {constant[0]}; leave it out of the surrogate"
         )
@@ -164,7 +165,7 @@ def relative_error(surrogate: Surrogate) -> FloatArray:
 
     Raises
     ------
-    ValueError
+    UserError
         If there are too few points to leave one out.
     """
     residuals = surrogate.leave_one_out()
@@ -186,12 +187,12 @@ def best_by_leave_one_out(surrogates: Mapping[str, Surrogate]) -> tuple[str, ...
 
     Raises
     ------
-    ValueError
+    UserError
         If there is nothing to choose from or the training data differ.
     """
     names = list(surrogates)
     if not names:
-        raise ValueError("choosing a surrogate needs at least one, got none; name one")
+        raise UserError("choosing a surrogate needs at least one, got none; name one")
     first = surrogates[names[0]]
     for name in names[1:]:
         other = surrogates[name]
@@ -199,7 +200,7 @@ def best_by_leave_one_out(surrogates: Mapping[str, Surrogate]) -> tuple[str, ...
             np.array_equal(first.points, other.points)
             and np.array_equal(first.values, other.values)
         ):
-            raise ValueError(
+            raise UserError(
                 f"surrogates '{names[0]}' and '{name}' must share their training data, got "
                 "different ones; fit them on the same samples"
             )
