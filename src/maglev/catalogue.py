@@ -1,4 +1,4 @@
-"""What the parameter and variable tables look like from outside: config file, schema, documents.
+"""Configuration file, schema and documents, written from the tables of parameters and variables.
 
 Everything here is made from `maglev.parameters` and `maglev.datasets`; the files in the repository
 are written by ``maglev describe`` and a test compares them.
@@ -34,7 +34,7 @@ def _number(value: float) -> str:
 
 
 def _written(field: FieldInfo, value: Any) -> Any:
-    """The value as a file would state it: with its unit, in the unit the default is stated in."""
+    """A value with its unit as a configuration file states it, in the unit of the default."""
     extra = _extra(field)
     if value is None or not extra.get("unit"):
         return list(value) if isinstance(value, tuple) else value
@@ -44,14 +44,14 @@ def _written(field: FieldInfo, value: Any) -> Any:
 
 
 def _sections(field: FieldInfo) -> tuple[type[Parameters], ...]:
-    """The parameter classes that may stand in a field, none for a plain value."""
+    """Parameter classes that a field can hold; empty for a plain value."""
     annotation = field.annotation
     members = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
     return tuple(m for m in members if isinstance(m, type) and issubclass(m, Parameters))
 
 
 def _named_section(field: FieldInfo) -> type[Parameters] | None:
-    """The parameter class of a field that holds sections by name, none for any other field."""
+    """Parameter class of a field that maps names to sections; None for any other field."""
     if get_origin(field.annotation) is not Mapping:
         return None
     section = get_args(field.annotation)[1]
@@ -63,7 +63,7 @@ def _extra(field: FieldInfo) -> dict[str, Any]:
 
 
 def _origins(field: FieldInfo) -> dict[str, tuple[str, str]]:
-    """Source and confidence that a section's field states for single values of its own default."""
+    """Source and confidence of single values, where the field of a section states them."""
     return _extra(field).get("origins", {})
 
 
@@ -316,7 +316,7 @@ def dataset_tables() -> str:
 
 
 def stage_tables() -> str:
-    """The document of all stages: what each reads, is given and makes, and its command."""
+    """The document of all stages: inputs, keys of the configuration, output and command of each."""
     lines = [
         "# Stages",
         "",

@@ -24,13 +24,13 @@ _File = click.Path(path_type=Path)
 
 
 class _BadConfiguration(click.ClickException):
-    """A mistake in the configuration ends as one on the command line does."""
+    """A mistake in the configuration; its exit code is that of a mistake on the command line."""
 
     exit_code = 2
 
 
 class _Commands(click.Group):
-    """The commands, those of stages made when asked for; a mistake ends with one sentence."""
+    """All commands, those of stages made when first used; a user's mistake ends in one sentence."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         from maglev.stage import summaries
@@ -46,7 +46,7 @@ class _Commands(click.Group):
         return None if "_" in name or summary(module) is None else _command(named(module))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the commands with a line each, without importing what stages compute with."""
+        """List each command on one line without importing any stage."""
         from maglev.stage import summaries
 
         lines = {name: one.get_short_help_str(100) for name, one in self.commands.items()}
@@ -65,7 +65,7 @@ class _Commands(click.Group):
 
 
 def _sentence(error: UserError | OSError) -> str:
-    """Our own words in one line, or a file's name with what the system says of it."""
+    """The message on one line; for an error of the system, the file's name and the reason."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {(error.strerror or 'cannot be used').lower()}"
     return " ".join(str(error).split())
@@ -117,7 +117,7 @@ def figure(name: str, data: tuple[Path, ...], out: Path) -> None:
 
 
 def _command(stage: Stage) -> click.Command:
-    """The command of a stage: what it asks for follows from the declaration."""
+    """Make the command of a stage from its declaration."""
     from maglev.stage import flag, summary
 
     def option(name: str, kind: Any, words: str, **more: Any) -> click.Option:
@@ -156,7 +156,7 @@ def _command(stage: Stage) -> click.Command:
 
 
 def _run(stage: Stage) -> Callable[..., None]:
-    """What the command of a stage does: read, compute, write."""
+    """Make the function behind the command of a stage: it reads, computes and writes."""
 
     def run(config: tuple[Path, ...], out: Path, **given: Any) -> None:
         from maglev import datasets
@@ -201,7 +201,7 @@ def _of_track(files: dict[str, Any]) -> dict[str, str]:
 
 
 def _files(stage: Stage, given: dict[str, Any]) -> dict[str, Any]:
-    """The files given for the roles that the stage has for the method, by name where it has many.
+    """Files by role; where a role has several, a mapping from their names.
 
     Raises
     ------

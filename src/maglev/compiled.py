@@ -1,4 +1,4 @@
-"""Where compiled functions are kept: a folder named after all the code that is compiled together.
+"""The cache of compiled functions: one folder for each state of the code compiled together.
 
 Numba's own cache looks at the file of a function alone, and goes on giving the old answer after an
 edit of a function that it calls in another file.  Here every edit of any such file leads to a new
@@ -22,7 +22,7 @@ _PACKAGE = Path(__file__).parent
 
 
 def sources() -> list[Path]:
-    """Files whose functions are compiled: kernels begin with an underscore, and the row type."""
+    """Source files of compiled functions: all kernels (leading underscore) and the lanes."""
     kernels = [path for path in _PACKAGE.glob("*/_*.py") if path.name != "__init__.py"]
     return sorted([*kernels, _PACKAGE / "mechanics" / "lanes.py"])
 
@@ -44,7 +44,7 @@ def _writable(folder: Path) -> bool:
 
 
 def folder() -> Path:
-    """Folder of the compiled functions of this code, made if need be.
+    """Folder of the compiled functions of this code, created if missing.
 
     It lies in ``NUMBA_CACHE_DIR`` if that is set, else in the user's cache, else in the folder for
     temporary files: the first that can be written.

@@ -22,7 +22,7 @@ from maglev.parameters import Config, Parameters
 
 
 class _UniqueKeys(yaml.SafeLoader):
-    """A safe loader that refuses a key given twice, of which YAML would keep the last."""
+    """A safe loader that refuses a duplicate key; plain YAML keeps the last one."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
@@ -190,7 +190,7 @@ def load_config(*paths: str | Path) -> Config:
 
 
 def config_text(mapping: Mapping[str, Any], directory: str | Path = ".") -> str:
-    """Text of a configuration file that is to lie in a directory.
+    """Text of a configuration file in a given directory.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def config_text(mapping: Mapping[str, Any], directory: str | Path = ".") -> str:
 
 
 def _shown(value: Any) -> str:
-    """A value as the file would write it, cut short."""
+    """A value as YAML, shortened to 60 characters."""
     text = value if isinstance(value, str) else yaml.safe_dump(value, default_flow_style=True)
     text = " ".join(text.removesuffix("...\n").split())
     text = text if len(text) <= 60 else f"{text[:57]}..."
@@ -218,7 +218,7 @@ def _shown(value: Any) -> str:
 
 
 def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, list[str]]:
-    """Return the dotted place in the file, without the tags of unions, and the keys known there."""
+    """Return the dotted key, without the tags of unions, and the known keys beside it."""
     place: list[str] = []
     candidates: tuple[Any, ...] = (model,)
     named: Any = None
@@ -283,7 +283,7 @@ _PHRASES = {
 
 
 def _sentence(model: type[Parameters], mapping: Mapping[str, Any], error: ErrorDetails) -> str:
-    """Say one finding of pydantic as a sentence with the dotted key and the value as written."""
+    """Turn one finding of pydantic into a sentence with the dotted key and the value as written."""
     kind, loc, context = error["type"], error["loc"], error.get("ctx", {})
     place, known = _keys_of(model, loc)
     if kind == "value_error":  # our own words, which begin with the key inside its section

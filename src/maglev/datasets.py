@@ -1,4 +1,4 @@
-"""What each file holds: dimensions, units and meaning of every variable; describe, check, write.
+"""Layouts of all files: dimensions, unit and meaning of every variable; describe, check, write.
 
 One table names every variable of every file once (`VARIABLES`); one table says which file holds
 which (`LAYOUTS`).  Files follow the CF conventions, appear whole or not at all, and two writes of
@@ -54,7 +54,7 @@ PER_RESPONSE = "one over that of the response"
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """One variable of a file: where it lives, in which unit, and what it means.
+    """One variable of a file: dimensions, unit and meaning.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Variable:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """The attributes that stand with the variable in a file."""
+        """Attributes of the variable in a file."""
         if self.units in (OF_RESPONSE, PER_RESPONSE):
             units = list(RESPONSE_UNITS.values())
             if self.units == PER_RESPONSE:
@@ -95,12 +95,12 @@ class Variable:
 
 
 def _number(dims: str, units: str, long_name: str, dtype: str = "float64") -> Variable:
-    """A variable on the dimensions that are named, with blanks between."""
+    """A variable on the named dimensions, given as words in one text."""
     return Variable(dims=tuple(dims.split()), units=units, long_name=long_name, dtype=dtype)
 
 
 def _code(dims: str, long_name: str, meanings: tuple[str, ...] | Mapping[int, str]) -> Variable:
-    """A code on the dimensions that are named; meanings without numbers are counted from 0."""
+    """A coded variable on the named dimensions; meanings without numbers are counted from 0."""
     return Variable(
         dims=tuple(dims.split()),
         units="1",
@@ -769,7 +769,7 @@ VARIABLES: Mapping[str, Variable] = _model_table() | _study_table()
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """One kind of file: its title, and the variables it must and may hold."""
+    """One kind of file: its title, its required and its optional variables."""
 
     title: str
     variables: tuple[str, ...]
@@ -1109,7 +1109,7 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def check(dataset: xr.Dataset, layout: str) -> None:
-    """Refuse a dataset that is not what its layout says.
+    """Refuse a dataset that departs from its layout.
 
     Parameters
     ----------
@@ -1156,7 +1156,7 @@ def provenance(
     code: str,
     inputs: Mapping[str, str | Path] | None = None,
 ) -> dict[str, str | int]:
-    """Return the global attributes that make a file explain itself.
+    """Return the global attributes of a file: title, source, configuration, code and inputs.
 
     Parameters
     ----------
@@ -1248,7 +1248,7 @@ def write_netcdf(dataset: xr.Dataset, path: str | Path) -> None:
 
 
 def read(path: str | Path, layout: str) -> xr.Dataset:
-    """Read a file into memory and check that it is what its layout says.
+    """Read a file into memory and check it against its layout.
 
     Raises
     ------

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 
 class UserError(ValueError):
-    """What a user has given cannot be used, for the reason that its sentence tells."""
+    """A mistake of the user, told in one sentence: the thing, the expected value, the given one."""
 
 
 class ConfigError(UserError):

@@ -1,4 +1,4 @@
-"""Fingerprints: of code, which changes when it does and not its docstrings; of files."""
+"""Fingerprints of code, which ignore docstrings, and of files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NAME = _PACKAGE.name
 
 
 def _file(module: str) -> Path | None:
-    """The file of a dotted name inside the package, none if there is no such module."""
+    """File of a module of the package; None if there is no such module."""
     stem = _PACKAGE.joinpath(*module.split(".")[1:])
     for path in (stem.with_suffix(".py"), stem / "__init__.py"):
         if path.is_file():
@@ -23,7 +23,7 @@ def _file(module: str) -> Path | None:
 
 @cache
 def _read(text: str) -> tuple[tuple[str, ...], str]:
-    """Names that a module may import, and its syntax tree without docstrings as a text."""
+    """Imported names of a module, and its syntax tree without docstrings as text."""
     tree = ast.parse(text)
     names: list[str] = []
     for node in ast.walk(tree):
@@ -35,7 +35,7 @@ def _read(text: str) -> tuple[tuple[str, ...], str]:
 
 
 def _imports(module: str) -> Iterator[str]:
-    """Modules of the package that a module imports, wherever in it the import stands."""
+    """Modules of the package that a module imports, anywhere in its code."""
     path = _file(module)
     if path is None:
         raise ValueError(f"there is no module {module}")
@@ -44,7 +44,7 @@ def _imports(module: str) -> Iterator[str]:
 
 
 def standing_on(*modules: str, without: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return modules of the package with all of the package that they import, in order of name.
+    """Return modules and all modules of the package that they import, sorted by name.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _without_docstrings(tree: ast.Module) -> ast.Module:
 
 
 def code_of(*modules: str, without: Sequence[str] = ()) -> str:
-    """Hash of the syntax trees of modules and of all of the package that they import.
+    """Hash of the syntax trees of modules and of all modules of the package that they import.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What was measured on the line: values with unit, source and how sure they are."""
+"""Measurements on a guideway: values with unit, source and confidence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is given: every physical parameter, in SI, with its meaning, source and confidence.
+"""Parameters: every physical quantity in SI with its meaning, source and confidence.
 
 One frozen class per physical thing.  The configuration file writes a quantity with its unit
 (``"24.768 m"``, ``"430 km/h"``); it is converted to SI once, here, and a wrong dimension, an
@@ -124,7 +124,7 @@ _FACTORS = {
 
 
 def _unreadable() -> tuple[type[Exception], ...]:
-    """What pint raises for a unit that it cannot read."""
+    """Exceptions of pint for an unreadable unit."""
     import pint
 
     python = (ArithmeticError, AssertionError, SyntaxError, TypeError, ValueError)
@@ -617,12 +617,12 @@ class Pier(Parameters):
         "m", "foot to top, cap included", 10, source="P", confidence="H", above=0
     )
     cap_height: float = quantity("m", "height of the cap", 1, source="A", confidence="L", above=0)
-    width_x: float = quantity("m", "along the line", 1.8, source="P", confidence="H", above=0)
+    width_x: float = quantity("m", "along the guideway", 1.8, source="P", confidence="H", above=0)
     width_y: float = quantity(
-        "m", "across the line, shaft", 1.8, source="P", confidence="H", above=0
+        "m", "across the guideway, shaft", 1.8, source="P", confidence="H", above=0
     )
     cap_width_y: float = quantity(
-        "m", "across the line, cap", 3.0, source="P", confidence="H", above=0
+        "m", "across the guideway, cap", 3.0, source="P", confidence="H", above=0
     )
     elastic_modulus: float = quantity(
         "Pa", "Young's modulus E", 3.0e10, source="P", confidence="H", above=0
@@ -842,7 +842,7 @@ _GROUP_OF_A_MAGNET = (
 
 
 class Circuit(Parameters):
-    """Which poles share a circuit, from which gap it is fed, and how late its current comes.
+    """One kind of control circuit: its poles, the gap that feeds it, and the lag of its current.
 
     ``pole``: every pole has a circuit of its own, fed by its own gap.  ``ends``: two a magnet, each
     fed by the gap at the outermost pole of its half.  ``half``: two a magnet, each fed by the mean
@@ -949,7 +949,7 @@ class Passage(Parameters):
 
 
 class Validation(Parameters):
-    """The sweep of speeds behind the dynamic coefficient and the measurements beside it."""
+    """Validation: the range of speeds of the dynamic coefficient, and the measurements."""
 
     speed_min: float = quantity(
         "m/s", "slowest passage", "50 km/h", source="P", confidence="H", above=0
@@ -989,7 +989,7 @@ _COUNTED = 2**14
 
 
 def _count(default: int, meaning: str, *, minimum: int = 1, maximum: int | None = None) -> Any:
-    """Describe a whole number that is a choice, not a measurement."""
+    """Describe a whole number that the user chooses."""
     return Field(default, description=meaning, ge=minimum, le=maximum)
 
 
@@ -1008,7 +1008,7 @@ class OneStage(Parameters):
 
 
 class PaperDesign(Parameters):
-    """Adaptive sampling as published (ASM): RBF, Taylor expansion, one response drives."""
+    """Adaptive sampling as published (ASM): RBF and Taylor expansion, driven by one response."""
 
     n_initial: int = _count(50, "runs of the first design, at most", minimum=8, maximum=_COUNTED)
     initial_per_gain: int = _count(
@@ -1073,7 +1073,7 @@ class Tracks(Parameters):
 
 
 class Study(Parameters):
-    """How densities and limits are found, for all cases."""
+    """Settings of densities and limits, for all cases."""
 
     failure_probability: tuple[float, ...] = Field(
         (0.1, 0.01, 0.001),
@@ -1127,7 +1127,7 @@ _RESERVED = ("config", "track", "guideway", "train", "figures", "tables", "check
 
 
 class Case(Parameters):
-    """Which gains are random, how much, on how many spans, and by which methods."""
+    """One case: its random gains, their variation, the number of spans and the methods."""
 
     n_spans: int = _count(5, "number of spans, in place of guideway.n_spans")
     set: Mapping[str, Any] = Field(
@@ -1206,7 +1206,7 @@ _OF_A_CASE = ("train", "guideway", "irregularity", "gains", "control", "passage"
 
 
 def _with_value(section: Any, keys: list[str], value: Any) -> Any:
-    """A section with another value at nested keys, read and checked as a file's would be."""
+    """Copy of a section with another value at nested keys, checked like a value from a file."""
     first, *rest = keys
     if not isinstance(section, Parameters) or first not in type(section).model_fields:
         raise KeyError(first)
@@ -1233,7 +1233,7 @@ measured, docs/convergence.md."""
 
 
 class Config(Parameters):
-    """Everything a run is made of."""
+    """All parameters of a run."""
 
     run: str = Field(
         "paper",

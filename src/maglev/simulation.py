@@ -1,4 +1,4 @@
-"""From a configuration and gains to passages: the one function that users of the model call."""
+"""Passages from a configuration and gains: the function that users of the model call."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def simulate(
 
 
 def track(config: Config, seed: int | None = None) -> Profile:
-    """Irregularity over all the track that the train sees.
+    """Irregularity over the whole track under the train.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def track(config: Config, seed: int | None = None) -> Profile:
 
 
 def track_words(config: Config, seeds: Sequence[int] | None = None) -> str:
-    """Of which track numbers are, in words.
+    """Name of the track of a configuration in words.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def _track_file_hash(config: Config) -> str:
 
 @lru_cache(maxsize=2)
 def _system(config: Config, _track_file: str) -> integrate.System:
-    """What passages of a configuration stand on, kept for the next call with the same track."""
+    """Prepared train, guideway and track of a configuration, cached for the next call."""
     return integrate.prepare(config, track(config))
 
 

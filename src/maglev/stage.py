@@ -1,4 +1,4 @@
-"""How a stage declares itself, and the view of the configuration that it computes with.
+"""Declaration of a stage, and its view of the configuration.
 
 A stage is one frozen value, ``STAGE``, in a module of `maglev.stages` of the same name.  Its
 command, its rule, its part of the configuration, the attributes of its file, its fingerprint and
@@ -34,7 +34,7 @@ EVERY_STAGE = ("demonstration",)
 
 @dataclass(frozen=True)
 class Input:
-    """One role that files play for a stage; its name is that of the stage that makes them.
+    """One input of a stage, named after the stage that makes it.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Input:
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
-    """What a stage is, beside its pure function.
+    """Declaration of a stage: name, inputs, keys of the configuration, layout, function.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class Stage:
 
     @property
     def code(self) -> str:
-        """Fingerprint of all the code that it computes with; how it is declared is none of it."""
+        """Fingerprint of all the code behind its function, the declaration left out."""
         return code_of(f"stages.{self.name}", without=["stage"])
 
     @property
@@ -114,12 +114,12 @@ class Stage:
 
     @property
     def reads_of(self) -> Literal["run", "case", "method"]:
-        """Whether what it reads is the same in a run, in each case, or for each method."""
+        """Whether its keys depend on the run alone, on the case, or on the method."""
         names = [name for name in ("method", "case") if any(f"{{{name}}}" in r for r in self.reads)]
         return cast(Literal["run", "case", "method"], names[0] if names else "run")
 
     def roles(self, method: str | None = None) -> dict[str, Input]:
-        """Its inputs, of a method those that the method has."""
+        """Its inputs by name; with a method, only those of that method."""
         return {
             role: one
             for role, one in self.inputs.items()
@@ -127,7 +127,7 @@ class Stage:
         }
 
     def keys(self, case: str | None = None, method: str | None = None) -> tuple[str, ...]:
-        """Dotted keys that it reads, with the names of case and method.
+        """Dotted keys of the configuration that it reads, case and method filled in.
 
         Raises
         ------
@@ -142,7 +142,7 @@ class Stage:
     def slice(
         self, config: Config, case: str | None = None, method: str | None = None
     ) -> dict[str, Any]:
-        """The part of a configuration that the stage reads, as a configuration file holds it.
+        """Part of a configuration that the stage reads, in the form of a configuration file.
 
         Parameters
         ----------
@@ -174,7 +174,7 @@ class Stage:
     def files(
         self, config: Config, case: str | None = None, method: str | None = None
     ) -> dict[str, str]:
-        """Files that the part of the configuration names, by the last word of their key."""
+        """Files named in its part of the configuration, by the last word of their key."""
         part = self.slice(config, case, method)
         return {keys[-1].removesuffix("_file"): name for keys, name in named_files(part)}
 
@@ -206,7 +206,7 @@ class Stage:
         case: str | None = None,
         method: str | None = None,
     ) -> None:
-        """Write the stage's dataset with all that explains it.
+        """Write the dataset with the attributes that document its origin.
 
         Parameters
         ----------
@@ -240,11 +240,11 @@ class Stage:
 
 
 class UndeclaredKeyError(LookupError):
-    """A stage has read a key of the configuration that its declaration does not name."""
+    """A stage has read an undeclared key of the configuration."""
 
 
 class View:
-    """A section of the configuration that answers only for the keys that a stage has declared.
+    """A section of the configuration restricted to the declared keys of a stage.
 
     It serves in place of the section: methods and properties of the section see the view.  Two
     views are equal if all they can be asked for is equal, files that it names by their bytes.
@@ -323,7 +323,7 @@ class View:
         return self
 
     def quantities(self) -> dict[str, Any]:
-        """What can be read, as the configuration file would write it, units included."""
+        """Readable values in the form of a configuration file, units included."""
         assert isinstance(self._section, Parameters)
         return _chosen(self._section.quantities(), self._reads)
 
@@ -355,7 +355,7 @@ def flag(name: str) -> str:
 
 
 def summary(name: str) -> str | None:
-    """First sentence of the module of a stage, which is not imported; none if there is no stage."""
+    """First sentence of the module of a stage, read without importing it; None if there is none."""
     path = _FOLDER / f"{name}.py"
     tree = ast.parse(path.read_text(encoding="utf-8")) if path.is_file() else ast.Module([], [])
     targets = [each for node in tree.body if isinstance(node, ast.Assign) for each in node.targets]
@@ -365,7 +365,7 @@ def summary(name: str) -> str | None:
 
 
 def summaries() -> dict[str, str]:
-    """What each stage does, by its name."""
+    """Summary of each stage by its name."""
     found = {path.stem: summary(path.stem) for path in sorted(_FOLDER.glob("*.py"))}
     return {name: words for name, words in found.items() if words is not None}
 
@@ -377,5 +377,5 @@ def named(name: str) -> Stage:
 
 
 def stages() -> dict[str, Stage]:
-    """All stages by their names; this imports what any of them needs."""
+    """All stages by their names; imports every module of a stage."""
     return {name: named(name) for name in summaries()}

@@ -1,4 +1,4 @@
-"""The words of the study: responses, gains, methods, and what a run, a design or a limit can be.
+"""Vocabulary: names of responses, gains, methods, statuses and decisions.
 
 Configuration, files, stages, rules and figures take them from here, so that a word is spelt once
 and its order is the same everywhere.

@@ -1,4 +1,4 @@
-"""Figures: one module each, named by what it shows; they read datasets and compute nothing new."""
+"""Figures: one module each, named after its content; they read datasets and compute nothing new."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ first all of the one, then all of the other."""
 
 
 def layouts_of(name: str, n_files: int) -> list[tuple[str, ...]]:
-    """Layouts of so many files of a figure, those behind a star together.
+    """Layouts of the files of a figure, grouped by entry of `FIGURES`.
 
     Parameters
     ----------

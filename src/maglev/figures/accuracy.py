@@ -1,4 +1,4 @@
-"""Accuracy bought per run: errors of the limits of every method against its number of runs."""
+"""Accuracy per run: errors of the limits of every method against its number of runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Densities, exceedances and limits of several files as curves: gathered, and drawn."""
+"""Densities, exceedances and limits of several files: collect them and draw them as curves."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _GIVEN = LIMIT_STATUS.index(GIVEN)
 
 
 def named(data: Sequence[xr.Dataset]) -> xr.DataArray:
-    """The coordinate ``curve`` of files: their cases and methods."""
+    """The coordinate ``curve``: case and method of each file."""
     names = [f"{labels.case_name(one)}-{labels.method_of(one)}" for one in data]
     flags = {"flag_values": np.arange(len(names), dtype="int32"), "flag_meanings": " ".join(names)}
     return xr.DataArray(np.arange(len(names), dtype="int32"), dims="curve", attrs=flags)
@@ -95,7 +95,7 @@ def _gathered(
 
 
 def body(curves: xr.Dataset, response: int, tail: float) -> tuple[float, float]:
-    """Range of values that holds all but ``tail`` of the held part of every curve on each side."""
+    """Range of values that leaves out at most ``tail`` of each held density on either side."""
     low, high = [], []
     for number in range(curves.sizes["curve"]):
         one = curves.isel(curve=number, response=response)
@@ -147,7 +147,7 @@ def draw_densities(axis: Axes, curves: xr.Dataset, response: int, styles: Sequen
 
 
 def draw_limits(axis: Axes, x: FloatArray, at: xr.Dataset, look: Look) -> None:
-    """Draw limits against something with their intervals.
+    """Draw limits and their intervals against another quantity.
 
     The line and hollow markers are the limits given that levitation holds, filled markers those of
     all passages: there are none where losses alone are likelier than the failure probability.  An

@@ -1,4 +1,4 @@
-"""Density of the midspan displacement by every method, its peaks and what they are worth."""
+"""Density of the midspan displacement by every method, and its peaks with their sampling noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Densities of the six extremes for gains that vary ever more."""
+"""Densities of the six extremes for growing coefficients of variation of the gains."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from maglev.figures import curves, labels, style
 def figure(
     densities: Sequence[xr.Dataset], designs: Sequence[xr.Dataset]
 ) -> tuple[Figure, xr.Dataset]:
-    """Draw the densities, a curve per coefficient of variation, and say what lies beyond.
+    """Draw the densities, a curve per coefficient of variation, and note the mass off the panel.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def figure(
 
 
 def _say_strays(axis: Axes, at: xr.Dataset, high: float, shown: labels.Shown) -> None:
-    """Say how much of the density that reaches farthest lies right of the panel, and how far."""
+    """Note how much of the widest density lies right of the panel, and how far it reaches."""
     held = at["curve_exceedance"] - at["curve_lost_probability"]
     farthest = at["curve_value"].where(held > 1e-9).max("cell")
     most = int(np.argmax(farthest.to_numpy()))

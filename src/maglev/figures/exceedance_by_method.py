@@ -1,4 +1,4 @@
-"""Probability that the extremes are exceeded, by every method, down to what the runs can carry."""
+"""Probability of exceedance of the extremes by every method, as far as the runs resolve it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The track irregularity along the line, and its spectra on those it is drawn from."""
+"""The track irregularity along the guideway, and its spectra beside the target spectra."""
 
 from __future__ import annotations
 

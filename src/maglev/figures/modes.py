@@ -14,7 +14,7 @@ _APART = 1.5  # neighbouring modes of one direction are of one family below this
 
 
 def _families(data: xr.Dataset) -> list[int]:
-    """Lowest modes of the first families, neighbours in frequency of one direction being one."""
+    """Lowest mode of each of the first families: neighbours in frequency with one direction."""
     lowest = []
     frequency, direction = data["frequency"].to_numpy(), data["direction"].to_numpy()
     for code in np.unique(direction):

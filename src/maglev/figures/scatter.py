@@ -1,4 +1,4 @@
-"""How the six extremes go together: pairs of responses of the baseline as densities of points."""
+"""Dependence of the six extremes: pairs of responses of the baseline as densities of points."""
 
 from __future__ import annotations
 

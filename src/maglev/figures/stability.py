@@ -1,4 +1,4 @@
-"""Which gains of the suspension hold the train: linearised map, and the runs that were lost."""
+"""Stability over the gains of the suspension: the linearised train, and the lost runs."""
 
 from __future__ import annotations
 
@@ -106,6 +106,6 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
 
 
 def _around(gains: np.ndarray, grid: np.ndarray) -> tuple[float, float]:
-    """Range of the runs with a margin, within that of the map."""
+    """Range of the runs with a margin, cut off at the edge of the map."""
     margin = 0.06 * np.ptp(gains)
     return max(gains.min() - margin, grid.min()), min(gains.max() + margin, grid.max())

@@ -1,4 +1,4 @@
-"""How every figure looks: sizes for print, colours that the colour-blind can tell apart."""
+"""Common style of all figures: sizes for print, colours safe for the colour-blind."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Look(TypedDict, total=False):
 
 @contextmanager
 def page() -> Iterator[None]:
-    """Set fonts and lines so that a figure reads at column width."""
+    """Set fonts and lines for a figure at column width."""
     with mpl.rc_context(
         {
             "font.size": 8,
@@ -67,12 +67,12 @@ def page() -> Iterator[None]:
 
 
 def titled(axis: Axes, letter: str, text: str) -> None:
-    """Put a panel's letter, and the number that matters, over its left edge."""
+    """Write a panel's letter and its main number above its left edge."""
     axis.set_title(f"({letter}) {text}", loc="left")
 
 
 def panels(rows: int, columns: int, width: float, height: float) -> tuple[Figure, list[Axes]]:
-    """A figure [inch] of equal panels, lettered (a), (b) … from left to right."""
+    """A figure of equal panels, lettered (a), (b) … from left to right; sizes in inches."""
     figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.07))
     axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
     for letter, axis in zip("abcdefghijklmnop", axes, strict=False):
@@ -81,7 +81,7 @@ def panels(rows: int, columns: int, width: float, height: float) -> tuple[Figure
 
 
 def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None:
-    """Write the number that matters into a corner of a panel."""
+    """Write a note into a corner of a panel."""
     axis.text(
         0.98 if right else 0.02,
         0.97 if top else 0.03,
@@ -130,7 +130,7 @@ def table(
 def below(
     figure: Figure, handles: Sequence[Artist], words: Sequence[str], columns: int, title: str = ""
 ) -> None:
-    """Put a legend in some columns under all panels, off the data."""
+    """Put a legend in columns below all panels."""
     figure.legend(
         handles,
         words,
@@ -142,12 +142,12 @@ def below(
 
 
 def say_track(figure: Figure, words: str) -> None:
-    """Write over a figure of which track its numbers are."""
+    """Write above a figure which track its numbers belong to."""
     figure.suptitle(words, x=0.995, ha="right", fontsize=6.5, color="#555555")
 
 
 def mark_demonstration(figure: Figure) -> None:
-    """Write 'demonstration' across a figure that shows no result."""
+    """Write 'demonstration' across a figure of a demonstration run."""
     figure.text(
         0.5,
         0.5,

@@ -76,7 +76,7 @@ def _with_interval(
     look: style.Look,
     track: int | None,
 ) -> None:
-    """A limit with its interval; an arrow's place is left empty where there is no upper end."""
+    """Draw a limit with its interval; an arrow stands for an infinite upper end."""
     chosen = at if track is None else at.isel(track=track)
     middle, low, high = (scale * float(chosen[f"{name}{end}"]) for end in ("", "_low", "_high"))
     reach: FloatArray = np.array([[middle - low], [high - middle]])

@@ -1,4 +1,4 @@
-"""What random gains and a random track each contribute to the six extremes."""
+"""Contributions of random gains and a random track to the six extremes."""
 
 from __future__ import annotations
 

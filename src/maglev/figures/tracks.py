@@ -1,4 +1,4 @@
-"""Densities of the six extremes on each of many tracks, and of the line that they make."""
+"""Densities of the six extremes on each of many tracks, and over all of them: the line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LINE: style.Look = {"color": "#000000", "lw": 1.4}
 
 
 def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
-    """Draw what each track adds to the density of the line, and the shares of the variance.
+    """Draw each track's part of the density of the line, and the shares of the variance.
 
     A track's density is over the number of tracks: the line's is the sum of all that are drawn.
 

@@ -1,4 +1,4 @@
-"""The modes of the levitated train: frequency against damping, by what moves."""
+"""The modes of the levitated train: damping against frequency, by the moving part."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ _SHOWN = ("girder_displacement_z", "girder_acceleration_z")
 
 
 def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
-    """Draw root mean square errors against the baseline, and errors at the runs that come next.
+    """Draw root mean square errors against the baseline, and errors at the next runs.
 
     Parameters
     ----------

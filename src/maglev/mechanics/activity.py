@@ -1,4 +1,4 @@
-"""Which coordinates of the guideway are stepped while the train is where it is.
+"""Active coordinates of the guideway: the spans near the train are stepped, the others rest.
 
 Spans under the train and their neighbours are awake: all of their coordinates are stepped, as are
 those of the middle span, which is watched.  Other spans are quiet.  Piers pass motion on along the
@@ -34,7 +34,7 @@ AWAKE_BESIDE = 3
 
 @dataclass(frozen=True)
 class Stretch:
-    """A stretch of steps in which the same coordinates are stepped.
+    """Consecutive steps with the same active coordinates.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Stretch:
 
 
 def stretches(config: Config, reduced: ReducedGuideway) -> list[Stretch]:
-    """Divide the steps of a passage, from that on which the nose reaches the guideway.
+    """Divide a passage into stages, from the step on which the nose reaches the guideway.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def stretches(config: Config, reduced: ReducedGuideway) -> list[Stretch]:
 
 
 def _neighbourhood(reduced: ReducedGuideway) -> tuple[IntArray, IntArray]:
-    """Span of each coordinate, -1 where it is a pier's, and its pier, of no meaning elsewhere."""
+    """Span number of each coordinate (-1 for piers), and pier number (piers only)."""
     n, n_modes = reduced.n_coordinates, reduced.n_modes
     n_piers = reduced.parameters.n_spans + 1
     of_span, of_pier = np.full(n, -1), np.zeros(n, dtype=np.int64)
@@ -102,7 +102,7 @@ def _neighbourhood(reduced: ReducedGuideway) -> tuple[IntArray, IntArray]:
 
 
 def _kept_quiet(reduced: ReducedGuideway) -> BoolArray:
-    """Coordinates that are stepped in quiet spans too: low modes, and pier tops."""
+    """Coordinates that stay active in quiet spans: low modes and pier tops."""
     kept = np.ones(reduced.n_coordinates, dtype=bool)
     square = reduced.stiffness.diagonal()[: reduced.n_modes]
     kept[: reduced.n_modes] = square < (2 * np.pi * QUIET_CUTOFF) ** 2
@@ -130,7 +130,7 @@ def _without_noise(matrix: Array) -> sp.csr_array:
 def stepped_mass(
     reduced: ReducedGuideway, stepped: BoolArray, time_step: float
 ) -> tuple[IntArray, Array]:
-    """Pier tops that are stepped, and the lower Cholesky factor of their mass in a step.
+    """Active pier tops, and the lower Cholesky factor of their mass in a step.
 
     Modes that are not stepped follow the tops with their mass.  A share Δt²/12 of the stiffness
     does for the tops what its response does for a mode: swings of their own keep their period to

@@ -74,7 +74,7 @@ class Link:
 
 
 def relative(first: Motion, second: Motion) -> Motion:
-    """Motion ``first - second``, such as that of a magnet's end against its C-frame."""
+    """Relative motion ``first - second``, such as that of a magnet's end against its C-frame."""
     return _combination(*first.items(), *((dof, -value) for dof, value in second.items()))
 
 

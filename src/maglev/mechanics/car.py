@@ -18,7 +18,7 @@ RIGHT, LEFT = +1, -1
 
 @dataclass
 class Assembly:
-    """Degrees of freedom and links as they are collected, car by car.
+    """Degrees of freedom and links of the train, collected car by car.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class CFrame:
 
 @dataclass(frozen=True)
 class Lump:
-    """A mass on a C-frame, one on either side, with the directions in which it moves with it.
+    """A pair of equal masses on a C-frame, and the directions in which they follow it.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class HungMagnet:
 
 @dataclass(frozen=True)
 class Car:
-    """The bodies of one car that others hang on or look at.
+    """The bodies of one car that neighbouring cars and the responses refer to.
 
     Attributes
     ----------
@@ -270,7 +270,7 @@ def _magnet_against_c_frame(
 
 
 def _lumps(train: Train, n_ends: int) -> tuple[Lump, ...]:
-    """What rides on a C-frame besides its own mass.
+    """Masses that ride on a C-frame besides its own.
 
     Parameters
     ----------
@@ -291,7 +291,7 @@ def _lumps(train: Train, n_ends: int) -> tuple[Lump, ...]:
 def _add_bogie(
     assembly: Assembly, train: Train, name: str, *, front_ends: int, rear_ends: int
 ) -> tuple[CFrame, CFrame]:
-    """Add a bogie with all that rides on it; return front and rear C-frame.
+    """Add a bogie and the masses on it; return front and rear C-frame.
 
     Half of its own mass is at either C-frame, at deck level.  Rods ride at their pivots, magnets
     with half their mass at each end in every direction in which they have no freedom; none has one

@@ -1,4 +1,4 @@
-"""Who shares a circuit: which gaps feed it, and which poles it drives.
+"""Control circuits of a magnet: the gaps that feed them and the poles that they drive.
 
 A circuit gives the current of one pole, of half a magnet or of a whole one.  Its signal is a mean
 of gaps; `Grouping` holds the weights, for the poles of one magnet from the front.  The law itself,
@@ -86,7 +86,7 @@ def grouping(group: str, n_poles: int) -> Grouping:
 
 @dataclass(frozen=True)
 class LateCurrent:
-    """How a current follows its signal from step to step: delay, then lag.
+    """Delay and lag of a current behind its signal, in steps.
 
     ``command = Σ delayed[j] signal[n - behind - j]`` and
     ``current[n] = decay current[n - 1] + now command[n] + before command[n - 1]``.
@@ -119,7 +119,7 @@ class LateCurrent:
 
 
 def late_current(lag: float, delay: float, time_step: float) -> LateCurrent:
-    """Delay and lag in steps.
+    """Weights of stored signals and currents for a given delay and lag.
 
     Parameters
     ----------
@@ -154,5 +154,5 @@ def late_current(lag: float, delay: float, time_step: float) -> LateCurrent:
 
 
 def circuits(circuit: Circuit, n_poles: int) -> Grouping:
-    """The `grouping` that a configuration asks for."""
+    """Circuits of a magnet by the configuration, see `grouping`."""
     return grouping(circuit.group, n_poles)

@@ -1,4 +1,4 @@
-"""Where the train is when: the run from start to end, its step, and the track it sees."""
+"""Course of a run: start, end, time step, and the stretch of track under the train."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Course:
 
     @property
     def advance(self) -> float:
-        """Way of the train in a step [m]."""
+        """Distance travelled in one step [m]."""
         return self.speed * self.time_step
 
     @property
@@ -53,12 +53,12 @@ class Course:
         return self.n_steps * self.time_step
 
     def nose(self, time: npt.ArrayLike) -> FloatArray:
-        """Place of the nose after given times [m], the first pier at zero."""
+        """Place of the nose at given times [m], zero at the first pier."""
         return self.start + self.speed * np.asarray(time)
 
 
 def course(config: Config) -> Course:
-    """The run of a configuration, in steps that fit the pole passing.
+    """Course of a configuration, its time step a whole fraction of the period of pole passing.
 
     A pole enters each span with a kink in its force, and poles follow one another at the rate
     v / pole pitch.  A step that divides this period keeps all harmonics of pole passing where they
@@ -100,7 +100,7 @@ def course(config: Config) -> Course:
 
 
 def _time_step(config: Config) -> float:
-    """Largest step that divides the period of pole passing as it should [s]."""
+    """Largest admissible fraction of the period of pole passing [s]."""
     pitch = config.train.suspension_magnet.pole_pitch
     period = pitch / config.passage.speed
     parts = math.ceil(period / config.passage.time_step * (1 - 1e-12))
@@ -125,7 +125,7 @@ def _start(config: Config, advance: float) -> float:
 
 
 def track_range(config: Config) -> tuple[float, float]:
-    """First and last place the irregularity is needed at [m], the first pier at zero."""
+    """First and last place at which the irregularity is needed [m], zero at the first pier."""
     length = config.train.length
     margin = config.train.car_pitch  # assumed: room at both ends for whatever stands ahead
     return -config.passage.approach - length - margin, config.guideway.length + length + margin

@@ -36,7 +36,7 @@ _TORSION_TERMS = 20  # odd terms of the series for a rectangle; the next is belo
 
 @dataclass(frozen=True)
 class BeamPlane:
-    """One plane of bending along a line of beams: how its elements follow the guideway's motion.
+    """One plane of bending of a row of beams: nodal motions from those of the guideway.
 
     Attributes
     ----------
@@ -54,12 +54,12 @@ class BeamPlane:
 
 @dataclass(frozen=True)
 class BeamLine:
-    """The beams that follow one another along one axis: a rail, or the girders.
+    """Beams in a row along one axis: a rail, or the girders.
 
     Attributes
     ----------
     start, length : (element,)
-        Place of an element's first node on the line, and its length [m]; ``start`` rises.
+        Place of an element's first node along the guideway, and its length [m]; ``start`` rises.
     vertical, lateral
         Bending with deflection along z and along y.
     """
@@ -72,7 +72,7 @@ class BeamLine:
 
 @dataclass(frozen=True)
 class GuidewayModel:
-    """Matrices of the guideway and the rows that read its motion along the line.
+    """Matrices of the guideway, and rows that give its motion at any place along it.
 
     Attributes
     ----------
@@ -119,13 +119,13 @@ class GuidewayModel:
     def rail_rows(
         self, x: npt.ArrayLike, side: int
     ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, sparse.csr_array]:
-        """Rows that read the motion of a rail's axis; their transposes place loads on it.
+        """Rows that give the motion of a rail's axis; their transposes apply loads to it.
 
         Parameters
         ----------
         x : (point,)
-            Places on the line [m], 0 at the first pier.  At the joint of two units the one ahead
-            counts; outside the guideway the rows are zero.
+            Places along the guideway [m], 0 at the first pier.  At the joint of two units the one
+            ahead counts; outside the guideway the rows are zero.
         side
             `RIGHT` or `LEFT`.
 
@@ -146,7 +146,7 @@ class GuidewayModel:
     def rail_section_rows(
         self, x: npt.ArrayLike, side: int
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Rows that read how far a rail's section has turned, shear left out.
+        """Rows that give the rotation of a rail's section, shear left out.
 
         Parameters
         ----------
@@ -166,12 +166,12 @@ class GuidewayModel:
         )
 
     def girder_rows(self, x: npt.ArrayLike) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Rows that read the motion of the girder axis.
+        """Rows that give the motion of the girder's axis.
 
         Parameters
         ----------
         x : (point,)
-            Places on the line [m], as in `rail_rows`; at a pier the span ahead counts.
+            Places along the guideway [m], as in `rail_rows`; at a pier the span ahead counts.
 
         Returns
         -------
@@ -228,7 +228,7 @@ class ModalDamping:
 
 @dataclass(frozen=True)
 class _Span:
-    """One span before it is repeated: its matrices and where its nodes are."""
+    """Matrices and nodes of one span."""
 
     mass: sparse.csr_array
     stiffness: sparse.csr_array
@@ -414,7 +414,7 @@ def _factors(matrix: sparse.csc_array) -> SuperLU:
 
 
 def _rigid_arm(dy: float, dz: float) -> FloatArray:
-    """Six motions at a point (0, dy, dz) from the six of the node it is rigidly fixed to."""
+    """Six motions at a point (0, dy, dz) from those of the node that carries it rigidly."""
     arm = np.eye(6)
     arm[X, PITCH], arm[X, YAW] = dz, -dy
     arm[Y, ROLL] = -dz
@@ -523,7 +523,7 @@ def _span(guideway: Guideway) -> _Span:
 
 
 def _rectangle(pier: Pier, width_y: float) -> BeamSection:
-    """Section of a pier in the axes of a beam that runs downwards (its z is -x of the line)."""
+    """Section of a pier in the axes of a beam that runs downwards (its z is -x of the guideway)."""
     wx, wy = pier.width_x, width_y
     about_y, about_x = wy * wx**3 / 12, wx * wy**3 / 12
     return BeamSection.model_construct(
@@ -645,7 +645,7 @@ def _line(
     element: tuple[IntArray, IntArray],
     span_start: IntArray,
 ) -> BeamLine:
-    """One axis of a span, repeated along the line."""
+    """One axis of a span, repeated along the guideway."""
     begin, end = element
     length = np.tile(span.node_x[end] - span.node_x[begin], guideway.n_spans)
     origin = guideway.span_length * np.arange(guideway.n_spans)[:, np.newaxis]
@@ -679,7 +679,7 @@ def _line(
 def _line_rows(
     line: BeamLine, x: npt.ArrayLike, n_dof: int
 ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, sparse.csr_array]:
-    """Rows of u_z, du_z/dx, u_y, du_y/dx at places on a line; zero beyond its ends."""
+    """Rows of u_z, du_z/dx, u_y, du_y/dx at places along an axis; zero beyond its ends."""
     return (
         _plane_rows(line, line.vertical, timoshenko.deflection_shape, x, n_dof),
         _plane_rows(line, line.vertical, timoshenko.slope_shape, x, n_dof),
@@ -695,7 +695,7 @@ def _plane_rows(
     x: npt.ArrayLike,
     n_dof: int,
 ) -> sparse.csr_array:
-    """Rows of one motion in one plane at places on a line; zero beyond its ends."""
+    """Rows of one motion in one plane at places along an axis; zero beyond its ends."""
     x = np.atleast_1d(np.asarray(x, dtype=float))
     on = (x >= 0) & (x <= line.start[-1] + line.length[-1])
     e = np.clip(np.searchsorted(line.start, x, side="right") - 1, 0, None)

@@ -1,4 +1,4 @@
-"""The production solver: checks what it is given, runs rows of samples, names each outcome."""
+"""The production solver: check the input, run rows of samples, collect their outcomes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class System:
-    """Everything a passage needs, as the kernels read it."""
+    """Train, guideway, magnets and track as arrays for the kernels."""
 
     train: train_model.TrainModel
     reduced: ReducedGuideway

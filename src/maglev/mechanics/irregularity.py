@@ -1,4 +1,4 @@
-"""Track irregularity along the line: harmonics on a target spectrum, or a measured profile.
+"""Track irregularity along the guideway: harmonics on a target spectrum, or a measured profile.
 
 Vertical displacements are positive downwards, lateral ones to the right, like z and y; x is zero at
 the first pier.  Theory: docs/theory/irregularity.md.
@@ -36,7 +36,7 @@ class Measured:
     source
         Where it comes from, for messages.
     x : (station,)
-        Place along the line [m], strictly rising, zero at the first pier.
+        Place along the guideway [m], strictly rising, zero at the first pier.
     displacement : (4, station)
         In the order of `PROFILE_NAMES` [m].
     """
@@ -48,7 +48,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Profile:
-    """Irregularity on a uniform grid, to be interpolated by cubic Hermite polynomials.
+    """Irregularity on a uniform grid, interpolated by cubic Hermite polynomials.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ def profile(
     seed: int,
     measured: Measured | None = None,
 ) -> Profile:
-    """Irregularity of both rails in both directions over a stretch of line.
+    """Irregularity of both rails in both directions over a stretch of track.
 
     Nothing before ``x = -fade_in``, in full from ``x = 0``, in between times a ramp with continuous
     curvature.  The same seed gives the same profile, bit for bit, whatever the stretch.
@@ -177,7 +177,7 @@ def displacement(profile: Profile, x: npt.ArrayLike) -> tuple[FloatArray, FloatA
 def mean_displacement(
     profile: Profile, x: npt.ArrayLike, length: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean of a profile over faces, and its derivative as the face moves on.
+    """Mean of a profile over the faces of poles, and its derivative along travel.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def _area(profile: Profile, x: FloatArray) -> FloatArray:
 
 
 def spectral_density(spectrum: Spectrum, wavenumber: npt.ArrayLike) -> FloatArray:
-    """One-sided power spectral density S(n), whose integral over n > 0 is the variance.
+    """One-sided power spectral density S(n); its integral over n > 0 is the variance.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def wavenumbers(irregularity: Irregularity) -> tuple[FloatArray, float]:
 
 
 def _coarse(irregularity: Irregularity) -> float:
-    """Grid spacing of what is not a sum of harmonics [m]."""
+    """Grid spacing without random harmonics [m]."""
     return irregularity.wavelength_min / _POINTS_PER_WAVELENGTH
 
 

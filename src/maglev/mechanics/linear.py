@@ -1,4 +1,4 @@
-"""The train linearised about rest on a rigid track, with its magnets closed by any control.
+"""The train linearised about rest on a rigid track, its circuits closed by any control.
 
 Its motion q obeys (M s² + C s + K + Σ h(s) G) q = 0, one term for each kind of magnet, where
 
@@ -52,7 +52,7 @@ _SAME_ROOT = 1e-3  # of the size of a root plus one: a collocated root that lead
 
 @dataclass(frozen=True)
 class Loop:
-    """The circuits of one kind of magnet as a block of the train sees them.
+    """Circuits of one kind of magnet in the coordinates of a block of the train.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Block:
-    """Coordinates of the train that move together.
+    """Coupled coordinates of the train, independent of all others.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Block:
 
 
 def closing_matrices(train: TrainModel, control: Control) -> tuple[Array, Array, Array]:
-    """What magnets at rest add to the train's stiffness, and what their circuits act by.
+    """Stiffness of the magnets at constant current, and force of their circuits per unit of gain.
 
     Parameters
     ----------
@@ -173,13 +173,13 @@ def closed_train(
 
 
 def of_kinds(gains: Array) -> tuple[Array, Array]:
-    """Gains k_p, k_d, k_a, k_i of suspension and of guidance."""
+    """Gains k_p, k_d, k_a, k_i, first of the suspension, then of the guidance."""
     suspension, guidance = GAINS_OF_KIND
     return gains[list(suspension)], gains[list(guidance)]
 
 
 def blocks(train: TrainModel, control: Control) -> tuple[Block, ...]:
-    """The linearised train in parts that do not know of one another.
+    """The linearised train in uncoupled blocks.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
 
 
 def characteristic(block: Block, gains: Array, s: complex) -> tuple[ComplexArray, ComplexArray]:
-    """The matrix of the block's motion at s, and its derivative by s; exact for any delay.
+    """Characteristic matrix of a block at s, and its derivative by s; exact for any delay.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ def characteristic(block: Block, gains: Array, s: complex) -> tuple[ComplexArray
 
 
 def rightmost(block: Block, gains: Array) -> complex:
-    """The root of a block with the largest real part [1/s], with imaginary part not negative.
+    """Rightmost root of a block [1/s], of a complex pair the one with positive imaginary part.
 
     Without delay an eigenvalue.  With delay, the one of the collocated delay polished on the
     characteristic equation; the collocation is refined until it leads to that root.
@@ -387,7 +387,7 @@ def growth_rate(parts: tuple[Block, ...], gains: Array) -> float:
 def modes(
     parts: tuple[Block, ...], gains: Array
 ) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
-    """Oscillations of the levitated train, from the slowest.
+    """Oscillatory modes of the levitated train, from the slowest.
 
     With delay there are more of them without end, fast and of the circuits; one for each pair of
     roots that the train has without delay is kept, the slowest.
@@ -429,7 +429,7 @@ def modes(
 def border(
     parts: tuple[Block, ...], gains: Array, gain: int, limit: float, n_steps: int = 24
 ) -> float:
-    """Value of one gain at which the train ceases to be stable.
+    """Value of one gain at the border of stability.
 
     Parameters
     ----------
@@ -534,12 +534,12 @@ def _families(train: TrainModel) -> list[Array]:
 
 
 def _across(name: str, n_cars: int) -> str:
-    """The degree of freedom that a name's is in a mirror along the train's middle."""
+    """Mirror image of a degree of freedom from side to side."""
     return re.sub("right|left", lambda side: "left" if side[0] == "right" else "right", name)
 
 
 def _along(name: str, n_cars: int) -> str:
-    """The degree of freedom that a name's is in a mirror across the train's middle."""
+    """Mirror image of a degree of freedom from end to end."""
     car, body, freedom = name.split(".")
     kind, number, side = re.fullmatch(r"([a-z]+)(\d*)(.*)", body).groups()  # type: ignore[union-attr]
     in_car, last = _IN_A_CAR[kind]

@@ -1,4 +1,4 @@
-"""A uniform load that moves over a simply supported Euler beam: the closed form by modes.
+"""A uniform load moving over a simply supported Euler beam: closed form by modes.
 
 The load reaches from its head backwards over its length.  As the beam is linear, the train is a
 load without end that enters at t = 0, less another that enters when the train's tail does.  With
@@ -93,7 +93,7 @@ def deflection_at_frequency(
 def _free(
     time: FloatArray, start: float, rate: float, omega: float, zeta: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Displacement and velocity of a free oscillator from its start, at times since then."""
+    """Displacement and velocity of a free oscillator at times after its start."""
     damped = omega * math.sqrt(1 - zeta**2)
     decay = np.exp(-zeta * omega * time)
     a, b = start, (rate + zeta * omega * start) / damped

@@ -1,4 +1,4 @@
-"""The guideway by its components: each span's own modes plus the pier tops that neighbours share.
+"""Component reduction of the guideway: modes of each span, and pier tops shared by neighbours.
 
 Craig-Bampton with the interface shapes made mass-orthogonal to the component modes, so that the
 mass matrix is the identity on the modes and banded on the pier tops.  Every coordinate belongs to
@@ -123,7 +123,7 @@ def rail_nodes(n_connectors: int) -> Array:
 def rail_weights(
     guideway: Guideway, x: npt.ArrayLike, *, lateral: bool
 ) -> tuple[npt.NDArray[np.int64], Array, Array]:
-    """How the coefficients of a span's rails make the motion of places along it.
+    """Weights of the rail coefficients of a span in the motion of places along it.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def rail_weights(
 
 @dataclass(frozen=True)
 class FaceWeights:
-    """How coefficients of the rails make their mean motion under faces at places along the line.
+    """Weights of the rail coefficients in the mean motion under faces along the guideway.
 
     Attributes
     ----------
@@ -247,7 +247,7 @@ def face_weights(
 def _met(
     joints: Array, low: Array, high: Array
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """First and last piece of rail of stretches; the nearest one for those off the guideway."""
+    """First and last piece of rail under stretches; off the guideway, the nearest piece."""
     last = joints.size - 2
     rear = np.clip(np.searchsorted(joints, low + 1e-9, side="right") - 1, 0, last)
     front = np.clip(np.searchsorted(joints, high - 1e-9, side="left") - 1, 0, last)
@@ -283,7 +283,7 @@ def _add_means(
 
 
 def _pieces(guideway: Guideway) -> Array:
-    """Where pieces of rail between neighbouring nodes meet, from the first pier to the last [m]."""
+    """Joints between pieces of rail, from the first pier to the last [m]."""
     rail = guideway.rail
     spacing = guideway.span_length / (rail.units_per_span * rail.connectors_per_unit)
     nodes = rail_nodes(rail.connectors_per_unit)[:-1] * spacing
@@ -293,7 +293,7 @@ def _pieces(guideway: Guideway) -> Array:
 
 
 def _coefficient_of(guideway: Guideway, piece: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """First of the four coefficients of a piece of rail, counted along the whole line."""
+    """First of the four coefficients of a piece of rail, counted along the whole guideway."""
     per_unit = guideway.rail.connectors_per_unit + 1
     return 2 * (piece + piece // per_unit)
 
@@ -301,7 +301,7 @@ def _coefficient_of(guideway: Guideway, piece: npt.NDArray[np.int64]) -> npt.NDA
 def _piece_weights(
     guideway: Guideway, piece: npt.NDArray[np.int64], x: Array, *, lateral: bool
 ) -> tuple[npt.NDArray[np.int64], Array, Array]:
-    """As `rail_weights` for places of which the piece of rail is known, along the whole line."""
+    """As `rail_weights`, along the whole guideway and for places on known pieces of rail."""
     rail = guideway.rail
     joints = _pieces(guideway)
     spacing = guideway.span_length / (rail.units_per_span * rail.connectors_per_unit)
@@ -471,7 +471,7 @@ def reduce(
 
 
 def _component_modes(model: full.GuidewayModel, dof: npt.NDArray[np.int64], cutoff: float) -> Array:
-    """Modes of the component ``dof`` with everything else held."""
+    """Modes of the component ``dof`` with all other degrees of freedom fixed."""
     stiffness = model.stiffness[dof][:, dof].toarray()
     mass = model.mass[dof][:, dof].toarray()
     limit = (2 * np.pi * cutoff) ** 2
@@ -485,7 +485,7 @@ def _component_modes(model: full.GuidewayModel, dof: npt.NDArray[np.int64], cuto
 def _basis(
     model: full.GuidewayModel, kinds: list[int], cutoffs: tuple[float, float]
 ) -> tuple[sp.csr_array, sp.csr_array, list[npt.NDArray[np.int64]]]:
-    """Shapes of all coordinates, what the modes take along, and the columns of each span."""
+    """Shapes of all coordinates, shares of modes carried by pier tops, columns of each span."""
     n_dof = model.mass.shape[0]
     tops = model.pier_top_dof.reshape(-1)
     parts = [(dof, ("span", kind)) for dof, kind in zip(model.span_dof, kinds, strict=True)]
@@ -545,7 +545,7 @@ def _pruned_to(matrix: sp.csr_array, drop: float) -> sp.csr_array:
 
 
 def _relative_damping(reduced: ReducedGuideway, bearings: Array, cutoff: float) -> sp.csr_array:
-    """A set share of critical in every mode up to the cut-off, its absolute rate beyond.
+    """Damping: a given share of critical up to the cut-off, a constant rate beyond.
 
     Acts on relative rates, where the matrix is closest to its diagonal.
     """
@@ -587,7 +587,7 @@ def _rail_nodes_rows(
 def _rest_at_midspan(
     model: full.GuidewayModel, reduced: ReducedGuideway
 ) -> tuple[Array, Array, Array]:
-    """How left-out modes of the middle span move midspan under forces on its rails [m/N].
+    """Flexibility of midspan to forces on the rails of the middle span by left-out modes [m/N].
 
     z under the coefficients of z, y under those of roll and of y.
     """

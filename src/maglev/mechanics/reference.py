@@ -93,7 +93,7 @@ class Energy:
 
 @dataclass
 class Fate:
-    """How each passage ends, as in `maglev.mechanics.responses.Passages`."""
+    """End of each passage, as in `maglev.mechanics.responses.Passages`."""
 
     status: IntArray
     lost_time: Array
@@ -111,7 +111,7 @@ class Fate:
 
 @dataclass
 class Record:
-    """Histories of one run, step by step, and how it ended.
+    """Histories of one run and the end of each passage.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ def _blank(of: System, n_steps: int, n_records: int) -> Record:
 
 @dataclass(frozen=True)
 class Watch:
-    """Where responses are read.
+    """Rows and degrees of freedom of the responses.
 
     Attributes
     ----------
@@ -199,7 +199,7 @@ class Watch:
 
 
 def watch(config: Config, model: guideway_model.GuidewayModel, poles: Poles) -> Watch:
-    """What is read of a train over a guideway."""
+    """Find the rows and degrees of freedom of the responses."""
     middle = (config.guideway.n_spans // 2 + 0.5) * config.guideway.span_length
     body = train_model.build(config.train).car_body_dof
     share = 1 / np.bincount(poles.magnet)[poles.magnet]
@@ -212,7 +212,7 @@ def watch(config: Config, model: guideway_model.GuidewayModel, poles: Poles) -> 
 
 
 def _note(record: Record, step: int, every: int, of: System, at: Watch, state: State) -> None:
-    """Write down what a step has brought."""
+    """Record the responses of a step."""
     record.girder[step, :2] = at.midspan @ state.guideway.x
     record.girder[step, 2:] = at.midspan @ state.guideway.a
     record.body_z[step], record.body_y[step] = state.train.a[at.body_z], state.train.a[at.body_y]
@@ -228,7 +228,7 @@ def _note(record: Record, step: int, every: int, of: System, at: Watch, state: S
 
 
 def _power(of: System, state: State) -> Array:
-    """Power of the magnets on train and guideway, and what is dissipated [W], (3, sample)."""
+    """Power of the magnets on train and guideway, and dissipated power [W], (3, sample)."""
     v_t, v_g = state.train.v, state.guideway.v
     lost = of.train.dissipated(v_t) + of.guideway.dissipated(v_g)
     on_train, on_guideway = (
@@ -248,7 +248,7 @@ def _stored(of: System, state: State) -> Array:
 
 
 def _judge(fate: Fate, of: System, state: State, time: float) -> None:
-    """Note which samples lose levitation; what is lost rests from then on."""
+    """Mark the samples that lose levitation; they stay at rest from then on."""
     gap, passage = state.magnets.gap, of.config.passage
     lost = (fate.status == 0) & ~held(of, state.magnets)
     for sample in np.flatnonzero(lost):
@@ -401,7 +401,7 @@ def integrate(
 
 @dataclass(frozen=True)
 class Effort:
-    """What a passage of known error has taken.
+    """Step, estimated error and computing time of a passage.
 
     Attributes
     ----------
@@ -439,7 +439,7 @@ def solve(
     record_interval: float | None = None,
     progress: bool = False,
 ) -> tuple[Passages, Effort]:
-    """Run one passage per row of gains with steps halved until the extremes stay.
+    """Run one passage per row of gains; halve the step until the extremes converge.
 
     Newmark's rule is of second order, and so are the histories of a run: of two runs, with Δt and
     Δt/2, a third of the difference is the error of the finer one and is taken off it.  Half of that
@@ -507,7 +507,7 @@ def solve(
 
 
 def extrapolated(coarse: Record, fine: Record) -> Record:
-    """The responses of a run less a third of what they differ from a run with twice its step."""
+    """Richardson extrapolation of the responses from two runs, one with twice the step."""
 
     def better(name: str) -> Array:
         one, other = getattr(coarse, name), getattr(fine, name)
@@ -548,7 +548,7 @@ def _estimated_error(better: Array, fine: Array, before: Array | None) -> Array:
 
 
 def _told(effort: Effort) -> str:
-    """An effort in words."""
+    """Steps and error of an effort in words."""
     shares = ", ".join(
         f"{name} {100 * worst:.2g} %"
         for name, worst in zip(RESPONSES, _worst(effort.error), strict=True)
@@ -565,7 +565,7 @@ def _worst(error: Array) -> Array:
 
 
 def passages_of(record: Record, every: int) -> Passages:
-    """Extremes, outcomes and every so many steps of the histories of a run."""
+    """Extremes, outcomes and thinned histories of a run."""
     status = record.fate.status
     girder, girder_time = extremes(record.girder, record.time, status)
     body_z, body_z_time = extremes(record.body_z, record.time, status)

@@ -1,4 +1,4 @@
-"""What magnets see and do in the reference solver: faces over rails and track, and circuits.
+"""Magnets of the reference solver: gaps under pole faces, and circuits.
 
 Theory: docs/theory/control.md and docs/theory/integration.md, "Reference solver".
 """
@@ -65,7 +65,7 @@ class Poles:
 
 
 def poles_of(train: train_model.TrainModel) -> Poles:
-    """Every pole of a train and how its gap follows the train's motion."""
+    """Poles of a train, and their gaps per unit of the train's motion."""
     magnets, parameters = train.magnets, train.parameters
     static = train_model.pole_static_force(parameters, magnets)
     kinds = (parameters.suspension_magnet, parameters.guidance_magnet)
@@ -104,7 +104,7 @@ def poles_of(train: train_model.TrainModel) -> Poles:
 
 
 class Rails:
-    """The rails as beam elements: mean of their deflection over a face, and its rate of travel.
+    """The rails as beam elements: mean deflection over a face, and its derivative along travel.
 
     Deflections are written in the elements' own ends: four numbers an element, deflection and turn
     of the section at either end, for both planes of both rails (`ends` reads them off the
@@ -129,7 +129,7 @@ class Rails:
         self.ends_transposed = self.ends.T.tocsr()
 
     def under(self, x: Array, speed: float, step: float) -> tuple[sp.csr_array, sp.csr_array]:
-        """Rows of what the faces of poles see of the rails.
+        """Rows of the mean rail deflection under the faces of poles.
 
         What jumps where a joint passes counts with its mean over one step, so that its impulse does
         not hang on where in a step the joint is met: the difference of a face's edges, and all that
@@ -168,7 +168,7 @@ class Rails:
         width: npt.ArrayLike,
         times: npt.ArrayLike = 1.0,
     ) -> sp.csr_array:
-        """Rows (pole, end) of a mean over ``width`` around ``x`` [m], nothing off the guideway."""
+        """Rows (pole, end) of a mean over ``width`` around ``x`` [m]; zero off the guideway."""
         width = np.broadcast_to(width, x.shape)
         low, high = (np.clip(x + side * width, 0.0, self.end) for side in (-0.5, 0.5))
         first = np.clip(np.searchsorted(self.start, low, side="right") - 1, 0, None)
@@ -192,7 +192,7 @@ class Rails:
 
 
 class Track:
-    """Irregularity as the faces of the poles see it."""
+    """Irregularity averaged over the faces of poles."""
 
     def __init__(self, profile: Profile, poles: Poles) -> None:
         grid = profile.x0 + profile.dx * np.arange(profile.values.shape[1])
@@ -264,7 +264,7 @@ class Circuits:
     step: float
 
     def delayed(self, signals: deque[Array]) -> Array:
-        """The part of the delayed signal (circuit, sample) [A] that earlier steps decide."""
+        """Part of the delayed signal (circuit, sample) [A] due to earlier steps."""
         total = np.zeros_like(self.proportional)
         for back, weight in self.taps:
             if 0 < back <= len(signals):
@@ -273,13 +273,13 @@ class Circuits:
 
     @property
     def at_once(self) -> Array:
-        """Weight (circuit, 1) of a signal of this step in the delayed signal of this step [-]."""
+        """Weight (circuit, 1) of the signal of this step in the delayed signal [-]."""
         return sum((weight for back, weight in self.taps if back == 0), np.zeros_like(self.current))
 
 
 @dataclass
 class Charge:
-    """Where the circuits are: each (circuit, sample), at the end of a step.
+    """State of the circuits at the end of a step, each (circuit, sample).
 
     Attributes
     ----------
@@ -299,7 +299,7 @@ class Charge:
 
 
 def delay_taps(delay: float, step: float) -> dict[int, float]:
-    """Weights of stored signals that give the signal a delay ago: a cubic through four of them.
+    """Weights of stored signals in the delayed signal: a cubic through four of them.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def delay_taps(delay: float, step: float) -> dict[int, float]:
 
 
 def lag_weights(lag: float, step: float) -> tuple[float, float]:
-    """`Circuits.decay` and `Circuits.newest`: exact for a command that is linear within the step.
+    """`Circuits.decay` and `Circuits.newest`, exact for a command linear within the step.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def circuits_of(config: Config, poles: Poles, gains: Array, step: float) -> Circ
 
 
 def resting(circuits: Circuits) -> Charge:
-    """The circuits before the run: no signal, the currents at their reference."""
+    """State of the circuits before the run: no signal, currents at their reference."""
     zero = np.zeros_like(circuits.proportional)
     depth = max(back for back, _ in circuits.taps) + 1
     rest = circuits.current + zero

@@ -1,4 +1,4 @@
-"""One step of the reference solver: Newmark's rule, iterated until the pole forces stay.
+"""One step of the reference solver: Newmark's rule, iterated until the pole forces converge.
 
 Theory: docs/theory/integration.md, "Reference solver".
 """
@@ -59,7 +59,7 @@ class Motion:
 
     @classmethod
     def at_rest(cls, n_dof: int, n_samples: int) -> Motion:
-        """A structure that does not move."""
+        """Motion of a structure at rest."""
         return cls(*(np.zeros((n_dof, n_samples)) for _ in range(3)))
 
 
@@ -102,7 +102,7 @@ class Structure:
         return inner
 
     def acceleration(self, force: Array) -> Array:
-        """Acceleration at the end of the step under what the predicted motion leaves over."""
+        """Acceleration at the end of the step from the residual force of the predicted motion."""
         a = self.factors.solve(force)
         if self.coefficient.size:
             a -= self.spread.T @ (self.gathered @ (self.spread @ force))
@@ -116,13 +116,13 @@ class Structure:
         return lost
 
     def predicted(self, before: Motion) -> Motion:
-        """The motion a step later as far as the last acceleration decides it."""
+        """Predictor: the motion a step later without its acceleration."""
         h = self.step
         x = before.x + h * before.v + h**2 * (0.5 - BETA) * before.a
         return Motion(x, before.v + h * (1 - GAMMA) * before.a, before.a)
 
     def moved(self, predicted: Motion, a: Array) -> Motion:
-        """The motion a step later with the acceleration ``a`` (dof, sample) at its end."""
+        """Corrector: the motion a step later with its acceleration ``a`` (dof, sample)."""
         h = self.step
         return Motion(predicted.x + BETA * h**2 * a, predicted.v + GAMMA * h * a, a)
 
@@ -158,7 +158,7 @@ def _factors(matrix: sp.csc_array) -> SuperLU:
 
 @dataclass(frozen=True)
 class System:
-    """All that does not change during a run with one step length.
+    """Constant data of a run with one step length.
 
     Attributes
     ----------
@@ -183,7 +183,7 @@ class System:
 
     @property
     def n_samples(self) -> int:
-        """Passages at the same time."""
+        """Number of simultaneous passages."""
         return self.circuits.proportional.shape[1]
 
 
@@ -194,7 +194,7 @@ def system(
     gains: Array,
     step: float,
 ) -> System:
-    """Everything for runs with one step length [s] and gains (sample, 8)."""
+    """Constant data of runs with one step length [s] and gains (sample, 8)."""
     train = train_model.build(config.train)
     poles = poles_of(train)
     mass = sp.csr_array(sp.diags_array(train.mass))
@@ -224,7 +224,7 @@ class Magnets:
 
 @dataclass
 class State:
-    """Where a run is, at the end of a step.
+    """State of a run at the end of a step.
 
     Attributes
     ----------
@@ -272,7 +272,7 @@ def at_rest(of: System) -> State:
 
 
 def closed_train(of: System, magnets: Magnets, sample: int) -> SuperLU:
-    """Factors of what the train's accelerations meet with the magnets closed, for one sample.
+    """Factors of the effective mass of the train with its circuits closed, for one sample.
 
     The effective mass plus the derivative of the magnets' forces to the accelerations at the end of
     the step, where the magnets are; only the way to a step's solution depends on it.
@@ -293,7 +293,7 @@ def closed_train(of: System, magnets: Magnets, sample: int) -> SuperLU:
 
 
 def stepped(of: System, state: State, view: View, running: npt.NDArray[np.bool_]) -> State:
-    """One step of Newmark's rule, iterated until the pole forces stay.
+    """One step of Newmark's rule, iterated until the pole forces converge.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ def stepped(of: System, state: State, view: View, running: npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class View:
-    """What the poles see at one time.
+    """Rails and track under the poles at one time.
 
     Attributes
     ----------
@@ -368,7 +368,7 @@ class View:
 
 
 def views(of: System, first: int, stop: int) -> Iterator[View]:
-    """What the poles see at the end of each step from ``first`` to ``stop``, found in blocks."""
+    """Rails and track under the poles after steps ``first`` to ``stop``, found in blocks."""
     speed, n = of.config.passage.speed, of.poles.x.size
     for begin in range(first, stop, BLOCK):
         time = (np.arange(begin, min(begin + BLOCK, stop)) + 1) * of.step
@@ -391,7 +391,7 @@ def views(of: System, first: int, stop: int) -> Iterator[View]:
 def _magnets(
     of: System, before: Charge, known: Array, view: View, train: Motion, guideway: Motion
 ) -> tuple[Magnets, Charge, Array]:
-    """Gaps, currents and forces of the poles with given motions, and the circuits behind them."""
+    """Gaps, currents and forces of the poles under given motions, and the state of the circuits."""
     poles, circuits = of.poles, of.circuits
     opening = poles.opening[:, None]
     error, rate, push = _apart(poles.opens @ np.hstack([train.x, train.v, train.a]), 3)
@@ -411,7 +411,7 @@ def _magnets(
 
 
 def _apart(side_by_side: Array, n: int) -> list[Array]:
-    """The arrays that stand side by side: one product with a sparse matrix is faster than many."""
+    """Split the columns of one product with a sparse matrix, which is faster than several."""
     return np.split(side_by_side, n, axis=1)
 
 

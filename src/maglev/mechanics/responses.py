@@ -1,4 +1,4 @@
-"""Which motions are reported, in which band, and what a set of passages leaves behind."""
+"""Reported responses: their band, their histories and extremes over a set of passages."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ GIRDER_RESPONSES = (
 
 @dataclass(frozen=True)
 class Passages:
-    """What a set of passages left behind; girder responses in the order of `GIRDER_RESPONSES`.
+    """Results of a set of passages; girder responses in the order of `GIRDER_RESPONSES`.
 
     Attributes
     ----------

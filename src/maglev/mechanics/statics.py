@@ -1,4 +1,4 @@
-"""The guideway under the train at rest: the deflection that a dynamic coefficient refers to."""
+"""The guideway under the train at rest: reference deflection of the dynamic coefficient."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 def midspan_of_middle_span(guideway: GuidewayModel) -> float:
-    """Place of the midspan whose motion is reported [m]; the span ahead of the middle if even."""
+    """Midspan of the middle span [m]; of an even number, the span ahead of the middle."""
     parameters = guideway.parameters
     return (parameters.n_spans // 2 + 0.5) * parameters.span_length
 
@@ -54,7 +54,7 @@ def deflection(guideway: GuidewayModel, train: TrainModel, nose: npt.ArrayLike) 
 
 
 def largest_deflection(guideway: GuidewayModel, train: TrainModel, step: float = 0.5) -> float:
-    """Largest `deflection` [m] while the train moves over the guideway at no speed.
+    """Largest `deflection` [m] over all places of the train.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How long a step of the production solver may be: the limit beyond which a motion grows.
+"""Stability limit of the time step of the production solver.
 
 The guideway's limit is that of its modes.  The train's is found from the step itself: the matrix
 that takes the linearised train with its circuits from one step to the next, for any gains.
@@ -70,7 +70,7 @@ def guideway_limit(config: Config, reduced: ReducedGuideway, time_step: float) -
 
 
 def train_parts(config: Config) -> tuple[Block, ...]:
-    """One car of the train, linearised with its circuits, in parts that do not know of one another.
+    """One car of the train, linearised with its circuits, in uncoupled blocks.
 
     The fast motions that limit the step are those of single magnets: more cars add none.
     """
@@ -103,7 +103,7 @@ def train_limit(parts: tuple[Block, ...], gains: Array, least: float = 1e-5) -> 
 
 
 def step_holds(parts: tuple[Block, ...], gains: Array, time_step: float) -> bool:
-    """Whether no motion of the train grows in a step that does not grow in the train itself.
+    """Whether each motion that decays in continuous time also decays in the scheme.
 
     The step tried is longer by a margin: the elastic guideway leaves less room than the rigid track
     of the linearised train.
@@ -120,14 +120,14 @@ def step_holds(parts: tuple[Block, ...], gains: Array, time_step: float) -> bool
 
 
 def _of_use(matrix: Array) -> Array:
-    """The matrix without the states that nothing follows from."""
+    """The matrix without states that influence no other."""
     while not (kept := matrix.any(axis=0)).all():
         matrix = matrix[np.ix_(kept, kept)]
     return matrix
 
 
 def safe_gains(parts: tuple[Block, ...], mean: Array, time_step: float) -> Array:
-    """Gains (8,) up to which, all together, the step holds: some multiple of the mean gains."""
+    """Largest common multiple of the mean gains (8,) at which the step is stable."""
     for times in SAFE_MULTIPLES:
         if step_holds(parts, times * mean, time_step):
             return times * mean
@@ -137,7 +137,7 @@ def safe_gains(parts: tuple[Block, ...], mean: Array, time_step: float) -> Array
 def samples_too_fast(
     parts: tuple[Block, ...], gains: Array, time_step: float, safe: Array
 ) -> npt.NDArray[np.bool_]:
-    """Samples whose gains make a motion grow by the step alone.
+    """Samples whose gains exceed the stability limit of the step.
 
     The larger a gain the shorter the step must be: a set of samples whose largest gains, all
     together, pass needs no closer look, and is halved if they do not.
@@ -176,7 +176,7 @@ def samples_too_fast(
 
 
 def step_matrix(block: Block, gains: Array, time_step: float) -> Array:
-    """Matrix that takes a block of the linearised train from one step to the next.
+    """Transition matrix of a block of the linearised train over one step.
 
     The state is displacement, velocity half a step before, and the accelerations of the last two
     steps; of the magnets' freedoms also what the circuits remember: the integral and the error, the
@@ -236,7 +236,7 @@ def step_matrix(block: Block, gains: Array, time_step: float) -> Array:
 
 
 def _largest_phase(ratio: float, *, exact: bool = False) -> float:
-    """Largest ωΔt at which a motion with this damping ratio does not grow [-].
+    """Largest stable ωΔt of an oscillator with this damping ratio [-].
 
     ``exact`` takes it as a component mode, which is stepped with its response and damping.
     """
@@ -258,14 +258,14 @@ def _largest_phase(ratio: float, *, exact: bool = False) -> float:
 
 
 def stepped_stiffness(reduced: ReducedGuideway) -> Array:
-    """Stiffness (coordinate, coordinate) when modes count from where the pier tops take them."""
+    """Stiffness (coordinate, coordinate) with modes relative to the motion of the pier tops."""
     return scipy.linalg.block_diag(
         np.diag(reduced.stiffness.diagonal()[: reduced.n_modes]), top_stiffness(reduced).toarray()
     )
 
 
 def stepped_inertia(reduced: ReducedGuideway, time_step: float) -> Array:
-    """Mass (coordinate, coordinate) to go with `stepped_stiffness`, as in a time step, symmetric.
+    """Symmetric mass (coordinate, coordinate) of a time step, for `stepped_stiffness`.
 
     A component mode has the inverse of its response as the mass of its own motion, and the pier
     tops a share of their stiffness on top of their mass.  The step itself is not symmetric: pier
@@ -278,7 +278,7 @@ def stepped_inertia(reduced: ReducedGuideway, time_step: float) -> Array:
 
 
 def step_response(reduced: ReducedGuideway, time_step: float) -> Array:
-    """Share of its acceleration with which each component mode is stepped; one for pier tops.
+    """Factor on the acceleration of each component mode in a step; one for pier tops.
 
     Verlet's step with sinc²(ωΔt/2) times the acceleration is exact for an undamped mode of circular
     frequency ω on its own, whatever the force at the steps.  Pier tops have a mass for the same

@@ -1,4 +1,4 @@
-"""The train: cars in a row, the magnets that neighbours share, and what each magnet carries.
+"""The train: cars in a row, magnets shared by neighbours, and the force of each magnet at rest.
 
 The train's nose is at x = 0, its cars at negative x, counted from the front like bogies, C-frames,
 magnets and poles.  Displacements are measured from the static equilibrium on rigid straight track.
@@ -271,7 +271,7 @@ def _magnet_table(
     weight: FloatArray,
     preload: float,
 ) -> MagnetTable:
-    """Collect the magnets and find what each carries with all of them held still."""
+    """Collect the magnets and find the force and moment of each with all of them held still."""
     is_guidance = np.array([magnet.is_guidance for _, magnet in magnets])
     car = np.array([number for number, _ in magnets])
     station = np.array([magnet.station for _, magnet in magnets])

@@ -1,4 +1,4 @@
-"""What accuracy a number of runs buys: limits of each method against those of the baseline."""
+"""Accuracy against number of runs: limits of each method against those of the baseline."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PAPER_N_RUNS = 273
 
 
 def steps(designs: Mapping[str, xr.Dataset]) -> dict[str, list[int]]:
-    """Numbers of runs at which each method is judged.
+    """Numbers of runs at which each method is assessed.
 
     A design that was made in rounds is judged after some of them, evenly spread; a one-stage set
     by its first samples, from as many as the smallest first design of the others has.
@@ -59,7 +59,7 @@ def steps(designs: Mapping[str, xr.Dataset]) -> dict[str, list[int]]:
 
 
 def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Judge every method by the baseline, for growing numbers of its runs.
+    """Compare every method with the baseline for growing numbers of runs.
 
     Surrogates are evaluated at the baseline's own points, so that its sampling noise, which both
     have in common, is not in the differences.  It is in the truth: half the interval of each of

@@ -1,4 +1,4 @@
-"""Baseline of a case: its chunks put together."""
+"""Baseline of a case, joined from its chunks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def dataset(
     baseline_points: xr.Dataset,
     baseline_chunk: Mapping[tuple[str, str], xr.Dataset],
 ) -> xr.Dataset:
-    """Put the chunks of a baseline together.
+    """Join the chunks of a baseline.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Some runs of the baseline of a case, but for those that the store holds."""
+"""A chunk of the baseline of a case; runs in the store are not repeated."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from maglev.vocabulary import BASELINE
 def dataset(
     config: Config, case: str, start: int, stop: int, store: str | Path, n_threads: int = 1
 ) -> xr.Dataset:
-    """Some runs of the baseline of a case.
+    """A chunk of the baseline of a case.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Points that the rounds of an adaptive method choose from."""
+"""Candidate points for the rounds of an adaptive method."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from maglev.vocabulary import ADAPTIVE
 
 
 def dataset(config: Config, case: str, method: str) -> xr.Dataset:
-    """GF points for the published method, Sobol' points for the one towards the limits.
+    """GF points for the published method, Sobol' points for ours.
 
     Parameters
     ----------

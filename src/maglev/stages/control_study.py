@@ -1,4 +1,4 @@
-"""What the sharing of circuits and their lag do to losses, deviations and limits."""
+"""Effect of the sharing of circuits and of their lag on losses, deviations and limits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LOST = tuple(f"lost_probability{end}" for end in _ENDS)
 
 
 def circuit(config: Config, case: str, kind: str) -> Circuit:
-    """The circuits of a kind of magnet in a case, its own values laid over those of all."""
+    """Circuits of a kind of magnet in a case, with the values that the case sets."""
     prefix = f"control.{kind}."
     own = {
         key.removeprefix(prefix): value
@@ -94,7 +94,7 @@ def dataset(
 
 
 def _moments(runs: xr.Dataset | None, confidence: float) -> np.ndarray:
-    """Mean, standard deviation and the ends of its interval (moment, response) of what held."""
+    """Mean, standard deviation and its interval (moment, response) of the held runs."""
     values = extremes(runs)[~lost(runs)] if runs is not None else np.empty((0, len(RESPONSES)))
     if values.shape[0] < 8:
         return np.full((4, len(RESPONSES)), np.nan)

@@ -199,7 +199,7 @@ def of_surrogate(
 
 
 def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> FloatArray:
-    """Where a density is given (place,): all around its body, sparsely towards strays.
+    """Places (place,) of a density: dense around its body, sparse towards strays.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> Flo
 
 
 def _column(values: FloatArray, probability: FloatArray, lost_probability: float) -> dict:
-    """What a density file holds of one response whose density is direct."""
+    """Variables of one response with a direct density."""
     bandwidth = silverman_bandwidth(values, probability)
     at = places(values, probability, bandwidth)
     sample = (at, values, probability)
@@ -240,7 +240,7 @@ def _column(values: FloatArray, probability: FloatArray, lost_probability: float
 
 
 def _put_together(columns: list[dict], lost_probability: float, n_runs: int) -> xr.Dataset:
-    """The file's dataset from what it holds of each response."""
+    """Dataset of the file from the variables of each response."""
     variables = {}
     for name in columns[0]:
         stacked = np.array([column[name] for column in columns])

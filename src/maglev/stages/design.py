@@ -1,4 +1,4 @@
-"""Designs: the runs that a surrogate is made from, in one stage or in adaptive rounds.
+"""Designs: training runs of a surrogate, in one stage or in adaptive rounds.
 
 An adaptive design is a fold over its rounds.  Each round is written to the store as a small file of
 its own before the next begins; to resume is to read them once more.  When to stop is decided from
@@ -60,7 +60,7 @@ def dataset(
     store: str | Path,
     n_threads: int = 1,
 ) -> xr.Dataset:
-    """Make a design, or go on with one that was stopped.
+    """Make a design, or resume an interrupted one.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def dataset(
 
 
 class _Design:
-    """One design and what its rounds have in common."""
+    """One design and the common data of its rounds."""
 
     def __init__(
         self,
@@ -147,7 +147,7 @@ class _Design:
         self.folder = self.store / "rounds" / case / method / key
 
     def _content(self) -> dict[str, object]:
-        """All that decides what the rounds hold: not when to stop, nor the final surrogate."""
+        """All settings that decide the rounds, without stopping rule and final surrogate."""
         chosen = case_of(self.config, self.case)
         quantities = self.settings.quantities()
         later = {"threshold", "n_rounds", "n_largest", "n_runs"}
@@ -164,7 +164,7 @@ class _Design:
         }
 
     def finished(self) -> xr.Dataset:
-        """All rounds, from the store or made now, until there is a reason to stop."""
+        """All rounds, from the store or computed, until the stopping rule holds."""
         state = AdaptiveState.empty(self.inputs.n, len(RESPONSES))
         surrogate: Surrogate | None = None
         rounds: list[xr.Dataset] = []
@@ -210,7 +210,7 @@ class _Design:
         limits_before: FloatArray | None,
         changes: list[float],
     ) -> Surrogate:
-        """Choose, run and judge the points of one round, and write it; the surrogate after it."""
+        """Choose, run and assess the points of a round and write it; return the new surrogate."""
         predicted: FloatArray | None = None
         if surrogate is None:
             initial = self.points["initial"]
@@ -272,7 +272,7 @@ class _Design:
         candidates: FloatArray,
         n_new: int,
     ) -> IntArray:
-        """Candidates of the next round; ``scores`` receives why."""
+        """Candidates of the next round; ``scores`` receives their scores."""
         region = None
         if state.lost.any():
             rng = generator(self.config.seed, "border", number)
@@ -307,7 +307,7 @@ class _Design:
         return RESPONSES.index(self.settings.response)
 
     def _limits(self, number: int, state: AdaptiveState, surrogate: Surrogate) -> FloatArray:
-        """Limits (response, level) by a surrogate, on points that are the same in all rounds."""
+        """Limits (response, level) by a surrogate, on the same points in all rounds."""
         held = None
         if state.lost.any():
             rng = generator(self.config.seed, "limits border", number)
@@ -323,7 +323,7 @@ class _Design:
         return np.sqrt(np.mean((surrogate.predict(standard) - values) ** 2, axis=0))[None]
 
     def _decision(self, state: AdaptiveState, changes: list[float]) -> int:
-        """Whether to go on, from the history alone: a number of `maglev.vocabulary.DECISIONS`."""
+        """Decision after a round: the number of a word in `maglev.vocabulary.DECISIONS`."""
         if self.method == "osm":
             return _LARGEST
         settings = self.settings
@@ -343,7 +343,7 @@ class _Design:
         return _LARGEST if state.lost.size >= largest else _GO_ON
 
     def _joined(self, rounds: list[xr.Dataset], state: AdaptiveState, reason: str) -> xr.Dataset:
-        """The whole design from its rounds."""
+        """The design, joined from its rounds."""
         of_sample = [str(name) for name in rounds[0].data_vars if "sample" in rounds[0][name].dims]
         of_round = [str(name) for name in rounds[0].data_vars if "round" in rounds[0][name].dims]
         parts = [
@@ -365,7 +365,7 @@ class _Design:
 
 
 def _absorbed(state: AdaptiveState, one: xr.Dataset) -> AdaptiveState:
-    """The state with one round more."""
+    """The state after one more round."""
     away = lost(one)
     predicted = one["predicted"].values if state.tested.size else None
     values = np.where(away[:, None], np.nan, extremes(one))

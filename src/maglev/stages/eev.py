@@ -1,4 +1,4 @@
-"""Predicted extremes at the representative points, and where levitation would be lost."""
+"""Predicted extremes and predicted losses of levitation at the representative points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The extremes of a set of runs as arrays, and the coordinates of what is made of them."""
+"""Extremes of a set of runs as arrays, and coordinates of the files derived from them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from maglev.vocabulary import METHODS, RESPONSES
 
 
 def lost(runs: xr.Dataset) -> BoolArray:
-    """Which samples of a set of runs (sample,) have lost levitation."""
+    """Samples of a set of runs that have lost levitation (sample,)."""
     return runs["status"].to_numpy() != 0
 
 

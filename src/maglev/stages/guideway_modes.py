@@ -1,4 +1,4 @@
-"""Natural modes of the guideway, and the frequency measured on the line."""
+"""Natural modes of the guideway, and the measured frequency."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _DIRECTION_OF_COMPONENT = (  # of x, y, z, φ, θ, ψ; rotations θ and ψ belon
 
 
 def euler_span(config: Config) -> Beam:
-    """One span as a simply supported Euler beam that carries the mass of its rails too."""
+    """One span as a simply supported Euler beam with the mass of girder and rails."""
     girder, rail = config.guideway.girder, config.guideway.rail
     of_rails = 2 * (rail.section.mass_per_length + rail.connector_mass)
     return Beam(

@@ -1,4 +1,4 @@
-"""Points of the first design of a method, of a one-stage design all of them."""
+"""Initial points of the design of a method; of a one-stage design, all points."""
 
 from __future__ import annotations
 

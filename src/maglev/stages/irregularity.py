@@ -1,4 +1,4 @@
-"""The irregularity that the train meets, and its spectra beside those it is drawn from."""
+"""The irregularity under the train, and its spectra beside the target spectra."""
 
 from __future__ import annotations
 

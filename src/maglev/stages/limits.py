@@ -1,4 +1,4 @@
-"""Limits of the six extremes at the failure probabilities, with intervals and a word on each."""
+"""Limits of the six extremes at the failure probabilities, with intervals and status."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def baseline_limits(config: Config, values: FloatArray, away: np.ndarray) -> lis
 
 
 def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> xr.Dataset:
-    """Limits off a surrogate at a large population, its own error carried into the interval.
+    """Limits of a surrogate on a large population, with its own error in the interval.
 
     The population is a scrambled Sobol' set taken for independent draws, which makes the sampling
     part of the interval too wide rather than too narrow.  Where no run was lost, the probability
@@ -188,7 +188,7 @@ def limits_off(
     residuals: FloatArray,
     losing: dict[str, Any],
 ) -> Limits:
-    """Limits of one response off a surrogate, each with the range of its errors near it.
+    """Limits of one response by a surrogate, each with the range of errors near it.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def limits_off(
 
 
 def status_numbers(limits: Limits) -> list[int]:
-    """What can be said of each limit, as the code of a file (level,)."""
+    """Status of each limit (level,), as the code in a file."""
     return [LIMIT_STATUS.index(status) for status in limits.status]
 
 

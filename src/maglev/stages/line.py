@@ -1,4 +1,4 @@
-"""What holds on the line, gains and track random, and what on one of its tracks alone."""
+"""Densities, limits and shares of the variance on the line (random track) and on each track."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def _densities(values: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _by_track(config: Config, tracks: xr.Dataset) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
-    """Limits and first-order indices of each track off its surrogate, and limits of the line."""
+    """Limits and first-order indices of each track by its surrogate, and limits of the line."""
     points = population(config.seed, N_POINTS, tracks.sizes["parameter"])
     n_tracks, n_responses = tracks.sizes["track"], len(RESPONSES)
     predictions = np.empty((n_tracks, N_POINTS, n_responses))
@@ -205,7 +205,7 @@ def _by_track(config: Config, tracks: xr.Dataset) -> dict[str, tuple[tuple[str, 
 
 
 def _of_track(tracks: xr.Dataset, number: int) -> xr.Dataset:
-    """Runs on one track, as a surrogate is made of them."""
+    """Runs on one track as training data of a surrogate."""
     one = tracks.isel(track=number)
     return xr.Dataset(
         {
@@ -268,7 +268,7 @@ def rows(found: xr.Dataset) -> list[dict[str, object]]:
 
 
 def _range(name: str, values: FloatArray) -> dict[str, object]:
-    """Smallest, middle and largest of what tracks have, those left out that have none."""
+    """Smallest, middle and largest finite value over the tracks."""
     known = values[np.isfinite(values)]
     ends = (np.nan,) * 3 if not known.size else (known.min(), np.median(known), known.max())
     return {
@@ -278,7 +278,7 @@ def _range(name: str, values: FloatArray) -> dict[str, object]:
 
 
 def text(found: xr.Dataset, heading: str) -> str:
-    """The table in Markdown: what the gains, the track and both do, then the limits."""
+    """The table in Markdown: shares of gains, track and both, then the limits."""
     table = rows(found)
     n, seed = found.sizes["track"], int(found["seed_of_track"][0])
     once = [one for one in table if one["failure_probability"] == table[0]["failure_probability"]]

@@ -1,4 +1,4 @@
-"""What survives of the paper's numbers, ours beside them, and why they differ."""
+"""The paper's numbers beside ours, and the reasons for differences."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def dataset(
 
 
 def rows(table: xr.Dataset) -> list[dict[str, object]]:
-    """The table as rows of a CSV file: one per quantity and method that either has."""
+    """The table as rows of a CSV file: one per quantity and method."""
     found: list[dict[str, object]] = []
     for name in table.data_vars:
         column = table[name]
@@ -172,7 +172,7 @@ def _peak(density: xr.Dataset) -> float:
 
 
 def _lowered(density: xr.Dataset) -> float:
-    """By which share a kernel of the file's bandwidth lowers the peak of a normal density."""
+    """Relative reduction of a normal density's peak by a kernel of the file's bandwidth."""
     ratio = float(density["bandwidth"]) / float(density["standard_deviation"])
     return 1.0 - 1.0 / np.sqrt(1.0 + ratio**2)
 
@@ -239,7 +239,7 @@ def _why_n_runs(designs: Mapping[str, xr.Dataset]) -> str:
 
 
 def _rmse(accuracy: xr.Dataset, response: int) -> tuple[dict[str, float], dict[str, int]]:
-    """Errors at the step that is nearest to the paper's number of runs, and that step's number."""
+    """Errors at the step nearest to the paper's number of runs, and the number of that step."""
     errors, numbers = {}, {}
     for row, code in enumerate(accuracy["method"].to_numpy()):
         n_runs = accuracy["step_n_runs"].to_numpy()[row]

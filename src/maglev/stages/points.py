@@ -1,4 +1,4 @@
-"""The random gains of a case: which they are, how they are distributed, and points of them.
+"""Random gains of a case: their columns, their distributions and their points.
 
 Every set draws from random numbers of its own, which the seed and the name of the set decide.  The
 names of the cases play no part: with the same random gains, all cases have the same points in

@@ -1,4 +1,4 @@
-"""How well each method predicts the runs of the baseline, run by run."""
+"""Predictions of each method for every run of the baseline."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random numbers of the stages: each purpose has a source of its own, whatever else is drawn."""
+"""Random numbers of the stages: an independent stream for each purpose."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 def generator(seed: int, *key: str | int) -> np.random.Generator:
-    """Random numbers for what the model is run with: points, candidates, tracks, rounds.
+    """Stream for inputs of the model: points, candidates, tracks, rounds.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def generator(seed: int, *key: str | int) -> np.random.Generator:
 
 
 def generator_of_statistics(seed: int, purpose: str) -> np.random.Generator:
-    """Random numbers for what is made of finished runs: populations, bootstraps, borders.
+    """Stream for statistics of finished runs: populations, bootstraps, borders.
 
     Seeds by the CRC-32 of the purpose, not by its letters as `generator` does: the numbers in
     print were drawn so.

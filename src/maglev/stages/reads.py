@@ -1,4 +1,4 @@
-"""What several stages read of the configuration, in groups that belong together."""
+"""Groups of keys of the configuration that several stages read."""
 
 from __future__ import annotations
 

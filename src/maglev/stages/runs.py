@@ -44,7 +44,7 @@ loses at most."""
 
 @cache
 def _code() -> str:
-    """Fingerprint of the model as it is when a job first asks: an edit must not slip in later.
+    """Fingerprint of the model at the start of a job; later edits do not count.
 
     `maglev.datasets` only names what the model computes, and the reference solver takes no part.
     """
@@ -52,7 +52,7 @@ def _code() -> str:
 
 
 def content(config: Config) -> dict[str, object]:
-    """All of a configuration that decides a run, beside its four gains; files by their bytes."""
+    """All parameters that decide a run besides its four gains; files by their bytes."""
     whole = config.quantities()
     part = {name: whole[name] for name in TRAIN_ON_GUIDEWAY}
     part["further_gains"] = list(config.gains.further)
@@ -63,18 +63,18 @@ def content(config: Config) -> dict[str, object]:
 
 
 def key_of(*parts: object) -> str:
-    """First 16 hexadecimal digits of a hash over what can be written as JSON."""
+    """First 16 hexadecimal digits of a hash over the JSON of a value."""
     text = json.dumps(parts, sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def folder_of(config: Config, store: str | Path) -> Path:
-    """Folder of the store in which the runs of a configuration lie."""
+    """Folder of the store for the runs of a configuration."""
     return Path(store) / "runs" / key_of(content(config), _code())
 
 
 def _row_keys(gains: FloatArray, seeds: IntArray | None) -> list[bytes]:
-    """What each run is found by: the bytes of its gains, and of its track seed if it has one."""
+    """Key of each run: the bytes of its gains, and of its track seed if it has one."""
     keys = [row.tobytes() for row in np.ascontiguousarray(gains, dtype="<f8")]
     if seeds is None:
         return keys
@@ -83,7 +83,7 @@ def _row_keys(gains: FloatArray, seeds: IntArray | None) -> list[bytes]:
 
 @cache
 def _keys_in(path: Path, written: int) -> tuple[bytes, ...]:
-    """What the runs of one file are found by, once for each time [ns] at which it was written."""
+    """Keys of the runs of one file, cached by its time of modification [ns]."""
     with _FILES, netCDF4.Dataset(path) as file:
         gains = np.stack([np.asarray(file[name][:], dtype=np.float64) for name in GAINS], axis=1)
         seeds = None
@@ -93,7 +93,7 @@ def _keys_in(path: Path, written: int) -> tuple[bytes, ...]:
 
 
 def _stored(folder: Path) -> dict[bytes, tuple[Path, int]]:
-    """Where each stored run lies: file and row."""
+    """File and row of each stored run."""
     return {
         key: (path, row)
         for path in sorted(folder.glob("*.nc"))
@@ -109,7 +109,7 @@ def stored_runs(
     track_seeds: npt.ArrayLike | None = None,
     n_threads: int = 1,
 ) -> xr.Dataset:
-    """Passages at given gains, of which only those are computed that the store does not hold.
+    """Passages at given gains; only runs missing from the store are computed.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def _compute(
 
 
 def _refuse_too_large_steps(gains: FloatArray, computed: xr.Dataset) -> None:
-    """Refuse to go on where the step is too large for the gains of a sample."""
+    """Refuse gains for which the time step is too large."""
     too_fast = np.flatnonzero(computed["status"].to_numpy() == STEP_TOO_LARGE)
     if too_fast.size:
         first = ", ".join(f"{gain:.4g}" for gain in gains[too_fast[0]])

@@ -1,4 +1,4 @@
-"""Where gains of the suspension hold the train: the linearised train and its borders."""
+"""Stability of the linearised train over the gains of the suspension, and its borders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the statistics mean something: halves of a baseline, methods against it, losses."""
+"""Checks of the statistics: halves of a baseline, methods against it, lost runs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _GIVEN, _, _INFINITE = range(len(LIMIT_STATUS))
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """One check: what was found, and between which values it passes.
+    """One check: its value and the range in which it passes.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def _against(
 
 
 def _ratio(difference: float, reach: float) -> float:
-    """A difference in units of a reach: 0 in an unbounded one, NaN without one."""
+    """A difference over a reach: 0 for an infinite reach, NaN without one."""
     if np.isnan(difference) or np.isnan(reach) or reach == 0.0:
         return 0.0 if difference == 0.0 else np.nan
     return float(difference / reach)
@@ -191,7 +191,7 @@ def _judged(
     high: float,
     codes: tuple[int, int],
 ) -> Check:
-    """A check with its verdict, from what can be said of the two limits that it compares."""
+    """A check with its verdict, from the status of the two compared limits."""
     infinite = [code == _INFINITE for code in codes]
     if all(infinite):
         value, passed = 0.0, YES  # both say that no limit exists

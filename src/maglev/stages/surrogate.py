@@ -1,4 +1,4 @@
-"""Surrogate of a design: fitted to the runs that held, with the region of those that did not."""
+"""Surrogate of a design, fitted to the held runs, with the region of the lost ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True, kw_only=True)
 class Predictor:
-    """What a design predicts: extremes where the train is held, and where it is not.
+    """Predictor of a design: extremes of held samples, and the region of lost ones.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ class Predictor:
     loss: Loss
 
     def held(self, points: FloatArray) -> np.ndarray:
-        """Which standardised points (point, parameter) are more likely held than lost."""
+        """Whether standardised points (point, parameter) are more likely held than lost."""
         return self.loss.lost_probability(points) < 0.5
 
 
 def predictor(config: Config, design: xr.Dataset, choice: str) -> Predictor:
-    """Fit the surrogate of a design and learn where its samples are lost.
+    """Fit the surrogate of a design and the region of its lost samples.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def predictor(config: Config, design: xr.Dataset, choice: str) -> Predictor:
 
 
 def stored_predictor(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> Predictor:
-    """The predictor that a file of the layout ``surrogate`` tells of, without a search.
+    """Predictor from a file of the layout ``surrogate``, without a search for parameters.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def dataset(config: Config, method: str, design: xr.Dataset) -> xr.Dataset:
 
 
 def loss_comment(loss: Loss) -> str:
-    """How a probability of lost levitation was found, in a sentence."""
+    """Sentence on the estimate of the probability of lost levitation."""
     if loss.region is None:
         return "no run was lost; the upper end is the exact binomial one, as if runs were drawn"
     return "from the region learnt from the lost runs; the interval is its credible one"

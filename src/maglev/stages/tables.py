@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def number(value: Any) -> str:
-    """A number with five digits, or a word for one that is none."""
+    """A number with five digits; a word for NaN and infinity."""
     value = float(value)
     return "–" if value != value else f"{value:.5g}"
 
@@ -26,7 +26,7 @@ def markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def of_track(found: xr.Dataset) -> str:
-    """Of which track the numbers of a file are, and where those of the line stand; a sentence."""
+    """Sentence on the track of the numbers in a file, and on the file for the whole line."""
     words = found.attrs.get("track", "")
     if "seed" not in words:
         return f"Our numbers are of: {words or 'tracks that the file does not name'}."

@@ -1,4 +1,4 @@
-"""Further runs of a case with a random track, to tell the gains from the track."""
+"""Further runs of a case with a random track, to separate gains and track."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from maglev.vocabulary import BASELINE, TRACK_PARTS
 def dataset(
     config: Config, case: str, part: str, store: str | Path, n_threads: int = 1
 ) -> xr.Dataset:
-    """Further runs of a case with a random track, to tell what gains and track contribute.
+    """Further runs of a case with a random track, to separate gains and track.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What random gains and a random track each contribute to the extremes."""
+"""Contributions of random gains and a random track to the extremes."""
 
 from __future__ import annotations
 

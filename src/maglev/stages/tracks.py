@@ -1,4 +1,4 @@
-"""The same gains on each of many tracks of the same spectra, but for runs that the store holds."""
+"""The same gains on each of many tracks of the same spectra."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Modes of the levitated train: how fast, how damped, and what moves."""
+"""Modes of the levitated train: frequency, damping and moving parts."""
 
 from __future__ import annotations
 

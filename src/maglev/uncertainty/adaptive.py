@@ -23,7 +23,7 @@ Batch = Callable[[Surrogate, FloatArray, FloatArray, int], IntArray]
 
 @dataclass(frozen=True, kw_only=True)
 class AdaptiveState:
-    """What is known after some batches.
+    """Samples and outcomes after some batches.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class AdaptiveState:
 
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
-    """What to run next.
+    """Points of the next round with their predictions.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def absorb(
     lost: npt.ArrayLike | None = None,
     predicted: npt.ArrayLike | None = None,
 ) -> AdaptiveState:
-    """The state with one more batch.
+    """The state after one more batch.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def absorb(
 def propose(
     state: AdaptiveState, fit: Fit, batch: Batch, candidates: npt.ArrayLike, n_new: int
 ) -> Proposal:
-    """The next points, and what the surrogate expects of them.
+    """Choose the next points and predict their responses.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def propose(
 
 
 def decision(state: AdaptiveState, *, threshold: float, n_rounds: int, n_largest: int) -> str:
-    """Whether to go on or why to stop, in the words of `maglev.vocabulary.DECISIONS`.
+    """Decide whether to go on, or why to stop; a word of `maglev.vocabulary.DECISIONS`.
 
     Parameters
     ----------

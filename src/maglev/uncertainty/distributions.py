@@ -1,4 +1,4 @@
-"""Independent random inputs: their marginal distributions and the three spaces points live in.
+"""Independent random inputs: marginal distributions, and maps between three spaces of points.
 
 A point is given in the unit cube (c), in standard form (u = (x - mean) / deviation, without a
 unit) or in physical form (x, the unit of the input).  Distances between points are measured in u.

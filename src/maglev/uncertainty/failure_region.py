@@ -1,4 +1,4 @@
-"""Where samples are lost: the border learnt from those that were, its probability, its uncertainty.
+"""Region of lost samples: its learnt border, its probability, their uncertainty.
 
 Whether a sample is lost is no matter of chance: there is a border g(u) = βᵀf(u) = 0, sharp but not
 known.  Its posterior is a set of borders, drawn so that each agrees with the samples seen; what
@@ -44,7 +44,7 @@ BLOCK = 8192
 
 @dataclass(frozen=True, kw_only=True)
 class FailureRegion:
-    """Learnt region of lost samples.
+    """Region of lost samples as a set of plausible borders.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ class FailureRegion:
 def fit_failure_region(
     points: npt.ArrayLike, lost: npt.ArrayLike, rng: np.random.Generator
 ) -> FailureRegion:
-    """Learn where samples are lost.
+    """Learn the border between held and lost samples.
 
     The coefficients of the quadratic border have independent normal priors of zero mean; the
     posterior is drawn by elliptical slice sampling, from a logistic regression on.
@@ -171,7 +171,7 @@ def fit_failure_region(
 
 @dataclass(frozen=True, kw_only=True)
 class Loss:
-    """What is known of the probability that a sample is lost.
+    """Probability of loss with its interval.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def learnt_loss(
     rng: np.random.Generator,
     confidence: float = 0.95,
 ) -> Loss:
-    """Probability of being lost, from the region learnt or, where none was lost, by counting.
+    """Probability of loss from the learnt region, or, without a lost sample, by counting.
 
     With lost samples the interval is the credible one of the region.  Without, the estimate is
     zero and the upper end is the exact binomial one; it takes the samples as drawn at random, and
@@ -258,7 +258,7 @@ def border_batch(
     *,
     scores: FloatArray | None = None,
 ) -> IntArray:
-    """Candidates whose outcome says most about the probability of being lost.
+    """Candidates with the most information on the probability of loss.
 
     With I_d(c) the outcome at c and P_d the probability of being lost, both for border d, the
     variance of P that a run at c takes away is cov(I(c), P)²/var I(c).  After each choice the part

@@ -53,7 +53,7 @@ _CHUNK = 512  # points whose increments are held in memory at once, assumed
 
 
 class _TooManySteps(UserError):
-    """Values far out ask for more than ``MOST_STEPS`` time steps."""
+    """The values need more than ``MOST_STEPS`` time steps."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ def density_with_strays(
     *,
     lost_probability: float = 0.0,
 ) -> tuple[EvolvedDensity, bool] | None:
-    """Density by PDEM where it can be had: of the values, or else of their logarithms.
+    """Density of the values by PDEM; if they spread too far, of their logarithms.
 
     A few values far out ask for more time steps than are sensible.  The logarithms of positive
     values may not; their density p_L is mapped back by ``p(y) = p_L(ln y) / y``.
@@ -328,7 +328,7 @@ def direct_density_band(
     lost_probability: float = 0.0,
     confidence: float = 0.95,
 ) -> tuple[FloatArray, FloatArray]:
-    """Band of the sampling noise of a direct density of independent runs, place by place.
+    """Pointwise band of the sampling noise of a direct density of independent runs.
 
     The density is a mean over all runs of the kernel φ_h, its variance that of the kernel over n;
     the mean of φ_h² is the direct density with the bandwidth h/√2, over 2√π h.  The kernel's bias

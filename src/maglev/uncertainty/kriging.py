@@ -134,7 +134,7 @@ class Kriging:
         return gradient
 
     def leave_one_out(self) -> FloatArray:
-        """Residual at each training point of the fit made without it, all parameters kept.
+        """Residual at each training point after a fit without it, all parameters kept.
 
         e_k = α_k / (K⁻¹)_kk; mean, deviation, lengths and amplitude stay as they are.
 
@@ -150,7 +150,7 @@ class Kriging:
         return self.deviation * self.weights / self._inverse_diagonal()
 
     def leave_one_out_deviation(self) -> FloatArray:
-        """Standard deviation that goes with each leave-one-out residual.
+        """Standard deviation of each leave-one-out residual.
 
         Returns
         -------
@@ -164,7 +164,7 @@ class Kriging:
         return self.deviation / np.sqrt(self._inverse_diagonal())
 
     def standard_deviation(self, points: npt.ArrayLike) -> FloatArray:
-        """Posterior standard deviation; a variance that rounding makes negative counts as zero.
+        """Posterior standard deviation; negative variances from rounding count as zero.
 
         Parameters
         ----------

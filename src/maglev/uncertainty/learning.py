@@ -1,4 +1,4 @@
-"""Which points to run next: scores of candidates, and batches chosen by them.
+"""Learning functions: scores of candidates, and batches of the next points.
 
 Both criteria have the same form, ``batch(surrogate, occupied, candidates, n_new, ...)``:
 ``taylor_batch`` is the published one and looks at the surrogate alone; ``tail_batch`` knows the
@@ -127,7 +127,7 @@ def taylor_batch(
     held_probability: npt.ArrayLike | None = None,
     scores: FloatArray | None = None,
 ) -> IntArray:
-    """Candidates of the largest score J, one after another.
+    """Candidates of the largest score J, chosen one by one.
 
     After each choice the remainder of the chosen candidate is zero and it counts as a sample for
     D and w; the remainders of the others wait for the next fit.
@@ -186,7 +186,7 @@ def predicted_limits(
     exceedances: Sequence[float],
     held_probability: npt.ArrayLike | None = None,
 ) -> FloatArray:
-    """Limits of a predicted sample in which every point may be lost.
+    """Limits of a predicted sample whose points are lost with given probabilities.
 
     The smallest y with mean(1 − h) + mean(h · I{Y > y}) ≤ P; infinite if losses alone exceed P.
 
@@ -234,7 +234,7 @@ def tail_batch(
     held_probability: npt.ArrayLike | None = None,
     scores: FloatArray | None = None,
 ) -> IntArray:
-    """Candidates that most reduce the variance of the surrogate where the limits are decided.
+    """Candidates that most reduce the variance of the surrogate near the limits.
 
     Every limit of every response is a target.  Its neighbourhood is a set of nodes, drawn from the
     candidates with weight exp(−(ŷ − y_P)²/2v)/√v, v = s² + (b σ)²: near the limit by prediction, or

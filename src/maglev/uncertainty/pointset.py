@@ -146,7 +146,7 @@ def sobol_points(marginals: Marginals, n: int, rng: np.random.Generator) -> Poin
 
 
 def rearranged(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Marginals) -> FloatArray:
-    """Points moved, input by input and order kept, to where their weights put them.
+    """Points shifted, input by input and in order, to the quantiles of their weights.
 
     ``x_qi <- F_i^-1( sum_k w_k I{x_ki < x_qi} + w_q / 2 )``, after which the GF-discrepancy is
     half the largest weight.  Doing it again with the same weights changes nothing.

@@ -132,7 +132,7 @@ class RBF:
         return gradient / self.length + self.tail[1:].T
 
     def leave_one_out(self) -> FloatArray:
-        """Residual at each training point of the fit made without it, shape and length kept.
+        """Residual at each training point after a fit without it, shape and length kept.
 
         e_k = λ_k / (A⁻¹)_kk with the whole saddle matrix A, tail included.
 
@@ -253,7 +253,7 @@ def fit_rbf(
 def fit_scaled_rbf(
     points: npt.ArrayLike, values: npt.ArrayLike, *, basis: str = "cubic"
 ) -> ScaledRBF:
-    """Interpolate each response with the length per input that leave-one-out prefers.
+    """Interpolate each response with lengths per input of least leave-one-out error.
 
     The mean square of the leave-one-out residuals is minimised over the logarithms of the lengths
     with its exact gradient, from the isotropic fit or, where it is better, from lengths inverse to
@@ -303,7 +303,7 @@ def fit_scaled_rbf(
 def _saddle_matrix(
     points: FloatArray, basis: str, shape: float, length: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Whole saddle matrix (sample + 1 + parameter, same) with Φ over its largest entry, and that.
+    """Saddle matrix (sample + 1 + parameter, same), Φ scaled by its largest entry, and that entry.
 
     The unit in which r³ is measured then says nothing about the condition number.
     """

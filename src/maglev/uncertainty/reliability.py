@@ -203,7 +203,7 @@ def surrogate_limits(
     lost_interval: tuple[float, float] | None = None,
     confidence: float = 0.95,
 ) -> Limits:
-    """Limits off a surrogate's predictions, its own error carried through to the interval.
+    """Limits from the predictions of a surrogate, with its own error in the interval.
 
     The surrogate's error is taken to have one sign all over the tail, the worst case: the lower
     end is the order-statistic lower end of ``prediction + low error``, the upper end likewise.
@@ -459,7 +459,7 @@ def error_range_near(
 def binomial_interval(
     n_beyond: FloatArray | float, n: int, confidence: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Exact interval of a probability of which ``n_beyond`` of ``n`` samples speak.
+    """Exact (Clopper-Pearson) interval of a probability from ``n_beyond`` of ``n`` samples.
 
     Parameters
     ----------
@@ -487,7 +487,7 @@ def binomial_interval(
 
 
 def _order_statistics(n: int, quantile: FloatArray, confidence: float) -> tuple[IntArray, IntArray]:
-    """Ranks, 0 to n + 1, of the order statistics that hold a quantile with the confidence."""
+    """Ranks, 0 to n + 1, of order statistics that enclose a quantile with this confidence."""
     outside = 0.5 * (1.0 - confidence)
     first = stats.binom.ppf(outside, n, quantile).astype(np.int64)
     last = stats.binom.ppf(1.0 - outside, n, quantile).astype(np.int64) + 1
@@ -513,7 +513,7 @@ def _residual_quantiles(residuals: npt.ArrayLike, confidence: float) -> tuple[fl
 
 
 def _fewest_residuals(confidence: float) -> int:
-    """How many residuals have their smallest and largest as an interval of the confidence."""
+    """Fewest residuals whose range is a prediction interval of this confidence."""
     return int(np.ceil(2.0 / (1.0 - confidence) * (1.0 - _ROUNDING))) - 1
 
 

@@ -1,4 +1,4 @@
-"""Weighted samples of an extreme value: their check, their part that is held, their size."""
+"""Weighted samples of an extreme value: checks, held part, effective size, quantiles."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SUM_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class HeldPart:
-    """The samples that have an extreme value, and the probability of those that have none.
+    """The held samples, and the probability of the lost ones.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ def deviation_interval(
 
     Raises
     ------
-    ValueError
+    UserError
         If there are fewer than eight values, or one is not finite.
 
     References
@@ -68,7 +68,7 @@ def deviation_interval(
     values, _ = weighted_sample(values)
     n = values.size
     if n < 8:
-        raise ValueError(f"the interval of a deviation needs at least 8 values, got {n}")
+        raise UserError(f"the interval of a deviation needs at least 8 values, got {n}")
     scale = values.std()
     if scale == 0.0:
         return 0.0, 0.0, 0.0
@@ -158,7 +158,7 @@ def checked_probability(probability: npt.ArrayLike, n: int) -> FloatArray:
 
 
 def check_lost_probability(lost_probability: float) -> None:
-    """Refuse a probability of lost samples that leaves nothing held.
+    """Refuse a probability of loss outside [0, 1).
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def check_lost_probability(lost_probability: float) -> None:
 def held_part(
     values: npt.ArrayLike, lost: npt.ArrayLike, probability: npt.ArrayLike | None = None
 ) -> HeldPart:
-    """Split off the lost samples, which have no extreme value and are failures for every limit.
+    """Split off the lost samples: they have no extreme value and fail every limit.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def held_part(
 
 
 def effective_size(probability: npt.ArrayLike) -> float:
-    """Number of equally weighted samples that spread the probability as evenly, 1 / sum(P^2).
+    """Effective sample size 1 / sum(P^2): equally weighted samples with the same sum of squares.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def weight_beyond(values: FloatArray, weight: FloatArray) -> tuple[FloatArray, F
 def weighted_quantile(
     values: npt.ArrayLike, weight: npt.ArrayLike, beyond: npt.ArrayLike, rounding: float = 1e-12
 ) -> FloatArray:
-    """Smallest value beyond which no more than a given weight lies.
+    """Smallest value with at most a given weight beyond it.
 
     Parameters
     ----------

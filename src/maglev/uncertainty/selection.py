@@ -88,7 +88,7 @@ class Selected:
 
 
 def fit_selected(points: npt.ArrayLike, values: npt.ArrayLike, choice: str) -> Selected:
-    """Fit the surrogate that is asked for, or all of them and keep the best for each response.
+    """Fit the surrogate of a given kind, or all kinds and keep the best for each response.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def rebuilt(
     length: npt.ArrayLike,
     amplitude: npt.ArrayLike,
 ) -> Selected:
-    """Make a surrogate again from its training data, kinds and parameters.
+    """Rebuild a surrogate from its training data, kinds and parameters.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How two independent groups of inputs share the variance of a response: pick-freeze or crossed."""
+"""Shares of two independent groups of inputs in the variance of a response."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def pick_freeze_shares(
     rng: np.random.Generator,
     confidence: float = 0.95,
 ) -> Shares:
-    """Closed Sobol' indices of two groups of inputs (a, b) that are all there is.
+    """Closed Sobol' indices of two groups of inputs (a, b) that together hold all inputs.
 
     With Y = f(a, b), Y_a = f(a, b') and Y_b = f(a', b), the share of a group is
     ``(mean(Y Y_a) - m^2) / (mean((Y^2 + Y_a^2) / 2) - m^2)`` with ``m = mean((Y + Y_a) / 2)``.
@@ -104,14 +104,14 @@ def pick_freeze_shares(
 
 
 def _share(y: FloatArray, kept: FloatArray, axis: int) -> FloatArray:
-    """Closed index of what two sets of runs have in common."""
+    """Closed index of the inputs that two sets of runs have in common."""
     mean = 0.5 * (y + kept).mean(axis=axis)
     covariance = (y * kept).mean(axis=axis) - mean**2
     return covariance / (0.5 * (y**2 + kept**2).mean(axis=axis) - mean**2)
 
 
 def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
-    """Shares of the variance from runs of every first input on every second, each once.
+    """Shares of the variance from a full cross of first and second inputs.
 
     The two-way analysis of variance with random effects: with the mean squares of n_a first and
     n_b second inputs, ``s_ab = M_ab``, ``s_a = (M_a - M_ab) / n_b``, ``s_b = (M_b - M_ab) / n_a``.
@@ -200,7 +200,7 @@ N_BINS = 64
 
 
 def first_order(points: npt.ArrayLike, values: npt.ArrayLike) -> FloatArray:
-    """First-order Sobol' indices from one set of many runs, by the means in bins of each input.
+    """First-order Sobol' indices from one large set of runs, by means in bins of each input.
 
     Parameters
     ----------

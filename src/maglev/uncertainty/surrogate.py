@@ -1,4 +1,4 @@
-"""What every surrogate offers, what it asks of its training data, and which one serves best.
+"""Interface of all surrogates, checks of training data, and choice by leave-one-out.
 
 All surrogates live in standardised inputs u = (θ − μ)/σ and carry several responses at once.
 """
@@ -35,7 +35,7 @@ class Surrogate(Protocol):
 
 
 class SurrogateWithDeviation(Surrogate, Protocol):
-    """A surrogate that knows how uncertain it is."""
+    """A surrogate with a posterior deviation and covariance."""
 
     def standard_deviation(self, points: npt.ArrayLike) -> FloatArray:
         """Standard deviations (point, response) at ``points`` (point, parameter)."""
@@ -48,7 +48,7 @@ Fit = Callable[[FloatArray, FloatArray], Surrogate]
 
 
 def checked_points(points: npt.ArrayLike, n_parameters: int | None = None) -> FloatArray:
-    """Points as a contiguous array of floats, after a look at their shape and their values.
+    """Points as a contiguous array of floats, checked for shape and finite values.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def checked_points(points: npt.ArrayLike, n_parameters: int | None = None) -> Fl
 
 
 def checked_training(points: npt.ArrayLike, values: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Training data as arrays, after a look at everything a surrogate cannot do without.
+    """Training data as arrays, checked for shape, finite values, distinct points and variance.
 
     Parameters
     ----------
