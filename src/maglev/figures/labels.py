@@ -162,10 +162,10 @@ _GROUP = {
 }
 _GROUP_COLOUR = {"pole": "#000000", "ends": "#0072B2", "half": "#D55E00", "lumped": "#009E73"}
 _LATE_COLOUR = {"pole": "#CC79A7", "ends": "#56B4E9", "half": "#E69F00", "lumped": "#F0E442"}
-_GROUP_DASHES = {"pole": "-", "ends": "--", "half": "-.", "lumped": ":"}
+_GROUP_DASHES: dict[str, LineStyleType] = {"pole": "-", "ends": "--", "half": "-.", "lumped": ":"}
 
 
-def control_style(design: xr.Dataset) -> tuple[str, dict[str, object]]:
+def control_style(design: xr.Dataset) -> tuple[str, style.Look]:
     """Words and line for a case by who shares a circuit, and how late its current comes.
 
     Raises
