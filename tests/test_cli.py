@@ -7,9 +7,10 @@ import sys
 
 import numpy as np
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 
-from maglev.cli import main
+from maglev.cli import _of_track, main
 
 
 @pytest.fixture(autouse=True)
@@ -106,3 +107,10 @@ def test_a_file_of_another_kind_is_refused_in_one_line(tmp_path):
     code, line = failure(*given)
     assert code == 1
     assert f"{tmp_path / 'a.nc'} cannot be read as NetCDF" in line
+
+
+def test_a_file_names_the_track_of_what_it_is_made_of():
+    one, other, none = (xr.Dataset(attrs=a) for a in ({"track": "a"}, {"track": "b"}, {}))
+    assert _of_track({"design": one, "limits": {"x": one, "y": none}}) == {"track": "a"}
+    assert _of_track({"limits": {"x": one, "y": other}}) == {"track": "a; b"}
+    assert _of_track({"points": none}) == {}

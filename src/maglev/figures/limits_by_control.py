@@ -32,7 +32,8 @@ def figure(
     """
     found = curves.limits(limits)
     levels = found["failure_probability"].to_numpy()
-    handles, words = [], []
+    handles: list[Line2D] = []
+    words: list[str] = []
     looks: list[style.Look] = []
     for number, (one, design) in enumerate(zip(limits, designs, strict=True)):
         name, look = labels.control_style(design)
