@@ -154,5 +154,11 @@ def late_current(lag: float, delay: float, time_step: float) -> LateCurrent:
 
 
 def circuits(circuit: Circuit, n_poles: int) -> Grouping:
-    """Circuits of a magnet by the configuration, see `grouping`."""
+    """Circuits of a magnet by the configuration, see `grouping`.
+
+    Examples
+    --------
+    >>> circuits(Circuit(group="lumped"), 4).feed
+    array([[0.25, 0.25, 0.25, 0.25]])
+    """
     return grouping(circuit.group, n_poles)

@@ -115,6 +115,15 @@ def closing_matrices(train: TrainModel, control: Control) -> tuple[Array, Array,
     References
     ----------
     docs/theory/control.md, eq. 3.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> attraction, _, _ = closing_matrices(build(config.train), config.control)
+    >>> bool(np.linalg.eigvalsh(attraction)[0] < 0)  # magnets alone are unstable
+    True
     """
     n = train.mass.size
     attraction, drawn = np.zeros((n, n)), (np.zeros((n, n)), np.zeros((n, n)))
@@ -161,6 +170,16 @@ def closed_train(
     Returns
     -------
     mass, stiffness, damping : (dof, dof)
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> mass, stiffness, damping = closed_train(build(config.train), gains)
+    >>> mass.shape == stiffness.shape == damping.shape
+    True
     """
     attraction, *drawn = closing_matrices(train, control or Control())
     mass, damping = np.diag(train.mass), train.damping.toarray()
@@ -173,7 +192,13 @@ def closed_train(
 
 
 def of_kinds(gains: Array) -> tuple[Array, Array]:
-    """Gains k_p, k_d, k_a, k_i, first of the suspension, then of the guidance."""
+    """Gains k_p, k_d, k_a, k_i, first of the suspension, then of the guidance.
+
+    Examples
+    --------
+    >>> of_kinds(np.arange(8.0))
+    (array([0., 1., 4., 5.]), array([2., 3., 6., 7.]))
+    """
     suspension, guidance = GAINS_OF_KIND
     return gains[list(suspension)], gains[list(guidance)]
 
@@ -192,6 +217,15 @@ def blocks(train: TrainModel, control: Control) -> tuple[Block, ...]:
     -------
     blocks
         Connected coordinates, even or odd from side to side and from end to end.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> parts = blocks(build(config.train), config.control)
+    >>> sum(part.mass.size for part in parts) == build(config.train).mass.size
+    True
     """
     attraction, *drawn = closing_matrices(train, control)
     matrices = (train.stiffness.toarray() + attraction, train.damping.toarray(), *drawn)
@@ -242,6 +276,16 @@ def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
     References
     ----------
     Breda, Maset and Vermiglio, SIAM J. Sci. Comput. 27 (2005) 482, for the delay.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> part = blocks(build(config.train), config.control)[0]
+    >>> bool(np.linalg.eigvals(state_matrix(part, gains)).real.max() < 0)
+    True
     """
     n = block.mass.size
     sizes = [n, n]
@@ -312,6 +356,17 @@ def characteristic(block: Block, gains: Array, s: complex) -> tuple[ComplexArray
     -------
     matrix, slope : (coordinate, coordinate)
         Complex; s is a root where the matrix is singular.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> part = blocks(build(config.train), config.control)[0]
+    >>> matrix, _ = characteristic(part, gains, rightmost(part, gains))
+    >>> bool(np.linalg.cond(matrix) > 1e8)  # singular at a root
+    True
     """
     matrix = np.diag(block.mass * s**2) + block.damping * s + block.stiffness
     slope = np.diag(2 * block.mass * s) + block.damping + 0j
@@ -343,6 +398,16 @@ def rightmost(block: Block, gains: Array) -> complex:
     ------
     RuntimeError
         If the collocation does not settle.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> part = blocks(build(config.train), config.control)[0]
+    >>> rightmost(part, gains).real < 0  # the part is stable
+    True
     """
     if not _late(block):
         roots = scipy.linalg.eigvals(state_matrix(block, gains))
@@ -380,6 +445,15 @@ def growth_rate(parts: tuple[Block, ...], gains: Array) -> float:
     References
     ----------
     docs/theory/control.md.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> growth_rate(blocks(build(config.train), config.control), gains) < 0
+    True
     """
     return max(rightmost(block, gains).real for block in parts)
 
@@ -405,6 +479,16 @@ def modes(
         With positive imaginary part [1/s]: the frequency is its size.
     shape : (mode, dof)
         Motion of the train's degrees of freedom, complex, without scale.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> roots, shapes = modes(blocks(build(config.train), config.control), gains)
+    >>> bool((roots.real < 0).all())
+    True
     """
     found: list[tuple[complex, npt.NDArray[np.complex128]]] = []
     for block in parts:
@@ -454,6 +538,18 @@ def border(
     ------
     UserError
         If the train is not stable at the start.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> parts = blocks(build(config.train), config.control)
+    >>> static = config.train.suspension_magnet
+    >>> limit = static.current_reference / static.gap_reference  # k_p that holds at rest
+    >>> border(parts, gains, 0, 0.5 * limit) > limit
+    True
     """
 
     def rate(value: float) -> float:
