@@ -19,7 +19,7 @@ def filled(layout):
     sizes |= {"wavenumber": 4, "speed": 3, "measured_speed": 1, "response": 6, "parameter": 4}
     sizes |= {"method": 2, "failure_probability": 3, "round": 2, "step": 3, "cell": 5, "check": 2}
     sizes |= {"source": 2, "grid_derivative": 2, "grid_proportional": 3}
-    sizes |= {"train_part": 9, "current_lag": 2, "track": 3, "curve": 2}
+    sizes |= {"train_part": 9, "current_lag": 2, "track": 3, "curve": 2, "beam_frequency": 4}
     names = [*LAYOUTS[layout].variables, *LAYOUTS[layout].optional]
     dims = {dim for name in names for dim in VARIABLES[name].dims}
     coords = {dim: np.arange(sizes[dim]) for dim in sorted(dims)}

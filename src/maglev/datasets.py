@@ -235,6 +235,25 @@ def _model_table() -> dict[str, Variable]:
         "speed", "1", "dynamic coefficient of a simply supported beam under a moving uniform load"
     )
     table["passage_status"] = _code("speed", "how the passage ended", STATUS)
+    table["beam_frequency"] = _number(
+        "beam_frequency", "Hz", "first vertical frequency of a simply supported beam"
+    )
+    table["beam_deflection"] = _number(
+        "beam_frequency", "m", "its static deflection with the mass and the load of the model"
+    )
+    table["model_frequency"] = _number("", "Hz", "first vertical frequency of the model")
+    table["car_load"] = _number("", "kg", "mass of a car that makes the load of the model")
+    table["mass_per_length"] = _number("", "kg m-1", "mass of the bridge per length, with rails")
+    table["bending_stiffness"] = _number("", "N m2", "vertical bending stiffness of the girder")
+    table["measured_static_deflection"] = _number(
+        "", "m", "measured deflection over the dynamic coefficient of a moving uniform load"
+    )
+    table["needed_car_load"] = _number(
+        "", "kg", "mass of a car with which the measured pair would be that of a beam"
+    )
+    table["needed_mass_per_length"] = _number(
+        "", "kg m-1", "mass of the bridge with which the measured pair would be that of a beam"
+    )
     table["measured_deflection"] = _number(
         "measured_speed", "m", "largest vertical deflection at midspan measured on the line"
     )
@@ -823,8 +842,8 @@ LAYOUTS: Mapping[str, Layout] = {
             "rail_shape_y",
             "rail_shape_z",
             "frequency_simply_supported",
-            "measured_frequency",
         ),
+        optional=("measured_frequency",),
     ),
     "train_modes": Layout(
         title="Natural modes of one levitated car at the mean gains",
@@ -848,7 +867,24 @@ LAYOUTS: Mapping[str, Layout] = {
             "static_deflection",
             "static_deflection_moving_load",
             "passage_status",
-            "measured_deflection",
+        ),
+        optional=("measured_deflection",),
+    ),
+    "stiffness_check": Layout(
+        title="Static deflection against first frequency, whatever the stiffness",
+        variables=(
+            "beam_deflection",
+            "model_frequency",
+            "static_deflection",
+            "car_load",
+            "mass_per_length",
+            "bending_stiffness",
+        ),
+        optional=(
+            "measured_frequency",
+            "measured_static_deflection",
+            "needed_car_load",
+            "needed_mass_per_length",
         ),
     ),
     "points": Layout(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
 
 from maglev.config import ConfigError, read_yaml, validated
-from maglev.parameters import Parameters
+from maglev.parameters import Config, Parameters
+
+_LOG = logging.getLogger(__name__)
 
 Confidence = Literal["high", "medium", "low"]
 
@@ -34,8 +37,39 @@ class Measurements(Parameters):
     """All that was measured on one line."""
 
     line: str = Field(description="name of the line")
-    first_vertical_frequency: MeasuredFrequency
-    peak_deflection: tuple[MeasuredDeflection, ...] = Field(description="one or more passages")
+    span_length: float = Field(
+        description="span of the bridge, pier to pier", gt=0, json_schema_extra={"unit": "m"}
+    )
+    first_vertical_frequency: MeasuredFrequency | None = None
+    peak_deflection: tuple[MeasuredDeflection, ...] = Field((), description="of some passages")
+
+
+SAME_SPAN = 1e-3
+"""How far spans of one length may differ [m]; assumed, finer than bridges are built."""
+
+
+def measured_here(config: Config) -> Measurements | None:
+    """What was measured on the bridge that the configuration describes; None if nothing was.
+
+    Raises
+    ------
+    ConfigError
+        As `load_measurements`.
+    """
+    validation = config.validation
+    if validation.measurements is None or not validation.measured_here:
+        return None
+    found = load_measurements(validation.measurements)
+    span = config.guideway.span_length
+    if abs(found.span_length - span) > SAME_SPAN:
+        _LOG.warning(
+            "%s was measured on spans of %g m, not %g m: its values are not shown",
+            found.line,
+            found.span_length,
+            span,
+        )
+        return None
+    return found
 
 
 def load_measurements(path: str | Path) -> Measurements:

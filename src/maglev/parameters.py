@@ -960,10 +960,15 @@ class Validation(Parameters):
     speed_step: float = quantity(
         "m/s", "between neighbouring speeds", "10 km/h", source="P", confidence="H", above=0
     )
-    measurements: str = Field(
+    measurements: str | None = Field(
         "measurements/shanghai.yaml",
-        description="measured values; path relative to the configuration file",
+        description="measured values; path relative to the configuration file; null: none",
         json_schema_extra={"file": True},
+    )
+    measured_here: bool = Field(
+        True,
+        description="whether they are of the bridge that guideway describes; if not, or if the "
+        "file's span has another length, no figure shows them",
     )
 
     @model_validator(mode="after")

@@ -8,11 +8,19 @@ from maglev import datasets
 from maglev.datasets import LAYOUTS, VARIABLES
 from maglev.figures import FIGURES, draw
 
-VALIDATION = ("irregularity", "deflection", "histories", "gaps", "modes", "train_modes")
+VALIDATION = (
+    "irregularity",
+    "deflection",
+    "histories",
+    "gaps",
+    "modes",
+    "train_modes",
+    "stiffness_check",
+)
 
 SIZES = {
     "sample": 1, "car": 2, "magnet": 4, "t": 400, "x": 60, "side": 2, "mode": 6,
-    "wavenumber": 20, "train_part": 9, "speed": 4, "measured_speed": 1,
+    "wavenumber": 20, "train_part": 9, "speed": 4, "measured_speed": 1, "beam_frequency": 30,
 }  # fmt: skip
 
 
@@ -39,11 +47,16 @@ def tiny(layout):
         data["frequency"] = (("mode",), np.array([2.0, 3.0, 8.5, 20.0, 28.0, 30.0]))
     if layout == "train_modes":
         data["moves"] = (("mode",), np.array([0, 1, 4, 5, 7, 8]))
+    if layout == "stiffness_check":
+        data["model_frequency"] = ((), 15.0)
+        data["measured_frequency"] = ((), 18.0)
     if layout == "dynamic_factor":
         data["passage_status"] = (("speed",), np.array([0, 0, 1, 0]))
     dataset = xr.Dataset(data, coords=coords)
     if layout == "dynamic_factor":
         dataset["measured_deflection"].attrs["confidence"] = "low"
+    if layout in ("modes", "stiffness_check"):
+        dataset["measured_frequency"].attrs["confidence"] = "low"
     return dataset
 
 
@@ -89,3 +102,22 @@ def test_a_passage_without_histories_cannot_be_drawn(tmp_path):
     for name in ("gaps", "histories"):
         with pytest.raises(ValueError, match="the passage has no histories"):
             draw(name, [path], tmp_path / "f")
+
+
+@pytest.mark.parametrize(
+    ("name", "of", "words"),
+    [("modes", "modes", "measured"), ("deflection", "dynamic_factor", "measured"),
+     ("stiffness_check", "stiffness_check", "measured")],
+)  # fmt: skip
+def test_without_a_measurement_of_this_bridge_none_is_shown(tmp_path, name, of, words):
+    paths = files(tmp_path, name)
+    for path, layout in zip(paths, FIGURES[name], strict=True):
+        if layout == of:
+            optional = LAYOUTS[layout].optional
+            bare = datasets.read(path, layout).drop_vars(
+                [*optional, "measured_speed"], errors="ignore"
+            )
+            datasets.write(bare, path, layout, config={}, code="abc")
+    draw(name, paths, tmp_path / "f")
+    with xr.open_dataset(tmp_path / "f.nc") as plotted:
+        assert not [one for one in plotted.variables if words in str(one)]

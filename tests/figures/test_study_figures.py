@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from test_figures import VALIDATION
 
 from maglev import datasets
-from maglev.figures import FIGURES, curves, draw, labels, layouts_of, style
+from maglev.figures import FIGURES, curves, draw, labels, layouts_of, stability, style
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +131,21 @@ def test_circuits_are_told_apart_by_their_words():
     assert words({"group": "half"}, {}) == "suspension half; guidance pole"
     with pytest.raises(ValueError, match="must say how its circuits"):
         labels.control_style(xr.Dataset())
+
+
+def test_a_run_that_was_not_judged_is_marked_and_not_counted_as_lost(files):
+    border, runs = (
+        datasets.read(path, layout)
+        for path, layout in zip(files["stability"], ("stability", "runs"), strict=True)
+    )
+    runs["status"][:] = 0
+    runs["status"][:3] = [1, 4, 4]
+    fig, _ = stability.figure(border, runs)
+    chart, count = fig.axes[0], next(axis for axis in fig.axes if axis.get_ylabel() == "runs")
+    assert {"lost: contact", "not judged: step too large"} <= set(
+        chart.get_legend_handles_labels()[1]
+    )
+    assert count.get_title(loc="left").startswith("(b) lost 1 of")
 
 
 def test_a_figure_says_of_which_track_its_numbers_are(tmp_path, files):

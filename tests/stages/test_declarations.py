@@ -166,7 +166,9 @@ def test_an_unknown_case_or_method_is_refused(chain):
 
 def test_a_slice_keeps_the_nesting_of_the_configuration(chain):
     part = named("guideway_modes").slice(chain.config)
-    assert part["validation"] == {"measurements": "measurements/shanghai.yaml"}
+    assert part["validation"] == {
+        "measurements": "measurements/shanghai.yaml", "measured_here": True,
+    }  # fmt: skip
     assert set(part) == {"demonstration", "guideway", "validation"}
     assert named("guideway_modes").files(chain.config) == {
         "measurements": "measurements/shanghai.yaml"

@@ -19,6 +19,11 @@ DRAWN = {
         "modes and frequencies of the guideway",
         [place("guideway_modes")],
     ),
+    "fig_stiffness": (
+        "stiffness_check",
+        "static deflection against frequency, whatever the stiffness",
+        [place("stiffness_check")],
+    ),
     "fig_train_modes": (
         "train_modes",
         "frequencies and damping of the train's modes",

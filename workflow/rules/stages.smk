@@ -7,6 +7,7 @@ FILES = {
     "passage": "validation/passage.nc",
     "deflection": "validation/deflection.nc",
     "dynamic_factor": "validation/dynamic_factor.nc",
+    "stiffness_check": "validation/stiffness_check.nc",
     "stability": "stability.nc",
     "train_modes": "train/modes.nc",
     "baseline_points": "{case}/points/baseline.nc",

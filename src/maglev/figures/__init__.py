@@ -14,6 +14,7 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "gaps": ("passage",),
     "modes": ("modes",),
     "train_modes": ("train_modes",),
+    "stiffness_check": ("stiffness_check",),
     "training": ("accuracy", "design*"),
     "prediction": ("prediction",),
     "density_by_method": ("density*",),

@@ -48,14 +48,14 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         of_direction = data["frequency"].where(data["direction"] == code, drop=True)
         top.plot(of_direction, np.full(of_direction.size, code), "|", color=style.MODEL, ms=9)
         top.text(0.3, code + 0.22, word, fontsize=7)
-    measured, closed = (
-        data[name].item() for name in ("measured_frequency", "frequency_simply_supported")
-    )
+    closed = data["frequency_simply_supported"].item()
     vertical = next(code for code, word in flags.items() if word == "vertical")
     first = data["frequency"].where(data["direction"] == vertical, drop=True).min().item()
-    top.plot(
-        measured, vertical, "D", color=style.MEASURED, ms=4, label=f"measured {measured:.2f} Hz"
-    )
+    if "measured_frequency" in data:
+        measured = data["measured_frequency"].item()
+        confidence = data["measured_frequency"].attrs.get("confidence", "unknown")
+        words = f"measured {measured:.2f} Hz ({confidence} confidence)"
+        top.plot(measured, vertical, "D", color=style.MEASURED, ms=4, label=words)
     top.plot(
         closed,
         vertical,

@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from maglev.figures import labels, style
-from maglev.vocabulary import STATUS
+from maglev.vocabulary import STATUS, STEP_TOO_LARGE
 
 _LOST = "#D55E00"
 _COLOURS, _LINES = (_LOST, "#CC79A7"), ("-", ":")  # without lag, with lag
-_MARKERS = {1: "x", 2: "+", 3: "*"}
+_MARKERS = {1: "x", 2: "+", 3: "*", STEP_TOO_LARGE: "s"}
 
 
 def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]:
@@ -51,8 +51,10 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
     for code, marker in _MARKERS.items():
         chosen = status == code
         if chosen.any():
-            word = f"lost: {STATUS[code].replace('_', ' ')}"
+            what = "not judged" if code == STEP_TOO_LARGE else "lost"
+            word = f"{what}: {STATUS[code].replace('_', ' ')}"
             look = {"ls": "", "marker": marker, "ms": 4, "mew": 0.8, "color": "#000000"}
+            look |= {"mfc": "none"} if code == STEP_TOO_LARGE else {}
             chart.plot(k_p[chosen], k_d[chosen], **look, label=word)
     lags = stability["current_lag"].to_numpy()
     for lag, line, colour in zip(lags, _LINES, _COLOURS, strict=True):
@@ -70,8 +72,8 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
     chart.grid(visible=False)
 
     edges = np.linspace(k_p.min(), k_p.max(), 41)
-    away = status != 0
-    held_count, lost_count = (np.histogram(k_p[chosen], edges)[0] for chosen in (~away, away))
+    away = ~held & (status != STEP_TOO_LARGE)
+    held_count, lost_count = (np.histogram(k_p[chosen], edges)[0] for chosen in (held, away))
     count.stairs(held_count, edges, color="#0072B2", fill=True, alpha=0.5, label="held")
     count.stairs(lost_count, edges, color="#000000", fill=True, label="lost")
     count.axvline(static, color="#000000", ls="--", lw=0.9)

@@ -62,6 +62,34 @@ class Beam:
         return 5 * load * self.length**4 / (384 * self.bending_stiffness)
 
 
+DEFLECTION_BY_FREQUENCY = 5 * math.pi**2 / 1536
+"""Static deflection times first frequency squared of a simply supported beam, over load per mass:
+(5pL⁴/384EI) (π²/4L⁴)(EI/m) = 5π²/1536 · p/m = 0.03213 p/m, whatever its stiffness and length."""
+
+
+def deflection_at_frequency(
+    frequency: npt.ArrayLike, load: float, mass_per_length: float
+) -> FloatArray:
+    """Static midspan deflection of the simply supported beam that has a first frequency.
+
+    Parameters
+    ----------
+    frequency
+        First natural frequency [Hz].
+    load
+        Uniform load on the whole beam [N/m].
+    mass_per_length
+        Of the beam [kg/m].
+
+    Returns
+    -------
+    deflection
+        [m], one for each frequency.
+    """
+    frequency = np.asarray(frequency, dtype=float)
+    return DEFLECTION_BY_FREQUENCY * load / mass_per_length / frequency**2
+
+
 def _free(
     time: FloatArray, start: float, rate: float, omega: float, zeta: float
 ) -> tuple[FloatArray, FloatArray]:

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from maglev.arrays import FloatArray
-from maglev.measurements import load_measurements
+from maglev.measurements import measured_here
 from maglev.mechanics import guideway, train
 from maglev.mechanics.moving_load import dynamic_factor
 from maglev.mechanics.statics import largest_deflection
@@ -78,7 +78,8 @@ def dataset(config: Config, store: str | Path, n_threads: int = 1) -> xr.Dataset
     UserError
         As `maglev.simulate`.
     """
-    measured = load_measurements(config.validation.measurements).peak_deflection
+    here = measured_here(config)
+    measured = () if here is None else here.peak_deflection
     beam, load = euler_span(config), load_per_length(config)
     static = largest_deflection(guideway.build(config.guideway), train.build(config.train))
     sweep = speeds(config)
@@ -103,14 +104,17 @@ def dataset(config: Config, store: str | Path, n_threads: int = 1) -> xr.Dataset
             "static_deflection": ((), static),
             "static_deflection_moving_load": ((), beam.static_deflection(load)),
             "passage_status": (("speed",), status),
-            "measured_deflection": (("measured_speed",), [one.value for one in measured]),
         },
-        coords={"speed": sweep, "measured_speed": [one.speed for one in measured]},
+        coords={"speed": sweep},
     )
-    result["measured_deflection"].attrs = {
-        "source": "; ".join(one.source for one in measured),
-        "confidence": ", ".join(one.confidence for one in measured),
-    }
+    if measured:
+        attributes = {
+            "source": "; ".join(one.source for one in measured),
+            "confidence": ", ".join(one.confidence for one in measured),
+        }
+        values = [one.value for one in measured]
+        result = result.assign_coords(measured_speed=[one.speed for one in measured])
+        result["measured_deflection"] = (("measured_speed",), values, attributes)
     return result
 
 

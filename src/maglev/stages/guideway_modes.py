@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from maglev.measurements import load_measurements
+from maglev.measurements import measured_here
 from maglev.mechanics import guideway
 from maglev.mechanics.guideway import RIGHT
 from maglev.mechanics.moving_load import Beam
 from maglev.parameters import Config
 from maglev.stage import Stage
+from maglev.stages.reads import MEASURED
 
 _CUTOFF = 45.0  # highest mode in the file [Hz], above the second vertical bending of a span
 _POINTS_PER_SPAN = 48  # of the shapes
@@ -55,7 +56,8 @@ def dataset(config: Config) -> xr.Dataset:
     ConfigError
         If the measurements cannot be read.
     """
-    measured = load_measurements(config.validation.measurements).first_vertical_frequency
+    here = measured_here(config)
+    measured = None if here is None else here.first_vertical_frequency
     model = guideway.build(config.guideway)
     frequency, shape = guideway.modes(model, _CUTOFF)
     energy = shape * (model.mass @ shape)  # sums to 1 over the degrees of freedom of a mode
@@ -81,21 +83,19 @@ def dataset(config: Config) -> xr.Dataset:
             "direction": (("mode",), share.argmax(axis=0)),
             **variables,
             "frequency_simply_supported": ((), euler_span(config).frequency()),
-            "measured_frequency": ((), measured.value),
         },
         coords={"mode": np.arange(1, frequency.size + 1), "x": x},
     )
-    dataset["measured_frequency"].attrs = {
-        "source": measured.source,
-        "confidence": measured.confidence,
-    }
+    if measured is not None:
+        attributes = {"source": measured.source, "confidence": measured.confidence}
+        dataset["measured_frequency"] = ((), measured.value, attributes)
     return dataset
 
 
 STAGE = Stage(
     name="guideway_modes",
     of="run",
-    reads=("guideway", "validation.measurements"),
+    reads=("guideway", *MEASURED),
     layout="modes",
     compute=dataset,
 )

@@ -17,6 +17,9 @@ RUNS_OF_CASE = (
 )
 """What the runs of a case depend on."""
 
+MEASURED = ("validation.measurements", "validation.measured_here")
+"""Whether and where there are measurements of the bridge."""
+
 N_SAMPLES = ("study.mcm.n_samples", "cases.{case}.n_samples")
 """What the size of a baseline depends on."""
 
