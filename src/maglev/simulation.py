@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from maglev import datasets, profiles
+from maglev.arrays import FloatArray
 from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
@@ -208,9 +209,7 @@ def _system(config: Config, _track_file: str) -> integrate.System:
     return integrate.prepare(config, track(config))
 
 
-def _dataset(
-    config: Config, gains: npt.NDArray[np.float64], passages: Passages, histories: bool
-) -> xr.Dataset:
+def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: bool) -> xr.Dataset:
     one, way = ("sample",), course(config)
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)

@@ -14,10 +14,9 @@ import numpy.typing as npt
 from scipy.fft import ifft, next_fast_len
 from scipy.interpolate import CubicSpline
 
+from maglev.arrays import ComplexArray, FloatArray
 from maglev.errors import UserError
 from maglev.parameters import GermanLaw, Irregularity, PowerLaw, RationalLaw, Spectrum
-
-FloatArray = npt.NDArray[np.float64]
 
 PROFILE_NAMES = ("vertical_right", "vertical_left", "lateral_right", "lateral_left")
 """Order of the ``profile`` dimension."""
@@ -361,7 +360,7 @@ def _random(
 
 
 def _harmonic_sum(
-    coefficient: npt.NDArray[np.complex128],
+    coefficient: ComplexArray,
     wavenumber: FloatArray,
     spacing: float,
     first: int,

@@ -14,10 +14,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from maglev.arrays import FloatArray
 from maglev.errors import UserError
 from maglev.parameters import BeamSection
-
-FloatArray = npt.NDArray[np.float64]
 
 X, Y, Z, ROLL, PITCH, YAW = range(6)
 """Places of a node's degrees of freedom."""

@@ -11,12 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.mechanics.bodies import FloatArray, IntArray, assembled, link_rows
+from maglev.mechanics.bodies import assembled, link_rows
 from maglev.mechanics.car import (
     LEFT,
     N_C_FRAMES,
@@ -54,7 +54,7 @@ class MagnetTable:
         Car of the magnet; one shared by two cars belongs to the car in front.
     """
 
-    is_guidance: npt.NDArray[np.bool_]
+    is_guidance: BoolArray
     side: IntArray
     x: FloatArray
     translation_dof: IntArray
