@@ -70,6 +70,11 @@ def overlay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Lay one nested mapping over another, key by key; neither is changed.
 
     A spectrum of another law replaces the one below it as a whole.
+
+    Examples
+    --------
+    >>> overlay({"passage": {"speed": "430 km/h"}}, {"passage": {"approach": "50 m"}})
+    {'passage': {'speed': '430 km/h', 'approach': '50 m'}}
     """
     merged = dict(base)
     for key, value in over.items():
@@ -92,7 +97,13 @@ def _file_keys(model: type[Parameters], path: tuple[str, ...] = ()) -> Iterator[
 
 
 def named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Yield the path of every key of the mapping that names a file, and the name."""
+    """Yield the path of every key of the mapping that names a file, and the name.
+
+    Examples
+    --------
+    >>> list(named_files({"irregularity": {"profile_file": "track.csv"}}))
+    [(('irregularity', 'profile_file'), 'track.csv')]
+    """
     for path in _file_keys(Config):
         value: Any = mapping
         for part in path:
@@ -102,7 +113,13 @@ def named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], s
 
 
 def rebase(mapping: Mapping[str, Any], *, old: str | Path, new: str | Path) -> dict[str, Any]:
-    """Rewrite file names that are relative to the directory ``old`` as relative to ``new``."""
+    """Rewrite file names that are relative to the directory ``old`` as relative to ``new``.
+
+    Examples
+    --------
+    >>> rebase({"irregularity": {"profile_file": "track.csv"}}, old="data", new=".")
+    {'irregularity': {'profile_file': 'data/track.csv'}}
+    """
     rebased = dict(mapping)
     for path, name in named_files(mapping):
         nested: Any = name if os.path.isabs(name) else os.path.relpath(os.path.join(old, name), new)
@@ -147,6 +164,11 @@ def from_mapping(mapping: Mapping[str, Any]) -> Config:
     ConfigError
         If a key is unknown, a value is of the wrong kind, unit or range, values do not fit each
         other, or a file that is named does not exist.
+
+    Examples
+    --------
+    >>> from_mapping({"passage": {"speed": "360 km/h"}}).passage.speed
+    100.0
     """
     config: Config = validated(Config, overlay(Config().quantities(), mapping))
     for path, name in named_files(mapping):
@@ -156,7 +178,14 @@ def from_mapping(mapping: Mapping[str, Any]) -> Config:
 
 
 def validated(model: type[Any], mapping: Mapping[str, Any]) -> Any:
-    """Build a parameter class; the first mistake becomes a `ConfigError` of one sentence."""
+    """Build a parameter class; the first mistake becomes a `ConfigError` of one sentence.
+
+    Examples
+    --------
+    >>> from maglev.parameters import Pier
+    >>> validated(Pier, {"height": "12 m"}).height
+    12.0
+    """
     try:
         return model.model_validate(mapping)
     except ValidationError as error:
@@ -182,6 +211,11 @@ def load_config(*paths: str | Path) -> Config:
     ConfigError
         If a file cannot be read, a key is unknown, a value is of the wrong kind, unit or range,
         values do not fit each other, or a file that is named does not exist.
+
+    Examples
+    --------
+    >>> load_config().guideway.n_spans  # the defaults
+    5
     """
     mapping: dict[str, Any] = {}
     for path in paths:
@@ -204,6 +238,12 @@ def config_text(mapping: Mapping[str, Any], directory: str | Path = ".") -> str:
     -------
     text
         YAML, from which `load_config` reads the same values again.
+
+    Examples
+    --------
+    >>> print(config_text({"passage": {"speed": "360 km/h"}}), end="")
+    passage:
+      speed: 360 km/h
     """
     moved = rebase(mapping, old=".", new=directory)
     return yaml.safe_dump(moved, sort_keys=False, allow_unicode=True)

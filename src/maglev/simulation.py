@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from maglev import datasets, profiles
+from maglev.arrays import FloatArray
 from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
@@ -82,6 +83,19 @@ def simulate(
     References
     ----------
     docs/theory/integration.md.
+
+    Examples
+    --------
+    >>> from maglev.parameters import Config
+    >>> from maglev.vocabulary import STATUS
+    >>> short = {"train": {"n_cars": 1}, "guideway": {"n_spans": 1}}
+    >>> config = Config.model_validate(short)
+    >>> passages = simulate(config, [config.gains.as_row])
+    >>> deflection = passages["girder_displacement_z"].item()
+    >>> 0.0 < deflection < 5e-3
+    True
+    >>> STATUS[passages["status"].item()]
+    'completed'
     """
     gains = checked_gains(gains, config.gains.further)
     if solver not in ("production", "reference"):
@@ -127,6 +141,13 @@ def track(config: Config, seed: int | None = None) -> Profile:
     ------
     UserError, FileNotFoundError
         If a measured profile cannot be read or is shorter than the run.
+
+    Examples
+    --------
+    >>> from maglev.parameters import Config
+    >>> found = track(Config(), seed=1)
+    >>> found.values.shape[0]  # both rails, vertical and lateral
+    4
     """
     irregularity = config.irregularity
     name = irregularity.profile_file if irregularity.enabled else None
@@ -144,6 +165,12 @@ def track_words(config: Config, seeds: Sequence[int] | None = None) -> str:
         Parameters of everything.
     seeds
         Of the tracks of samples that have each their own.
+
+    Examples
+    --------
+    >>> from maglev.parameters import Config
+    >>> track_words(Config())
+    'track of seed 20240919'
     """
     if not config.irregularity.enabled:
         return "smooth track"
@@ -182,9 +209,7 @@ def _system(config: Config, _track_file: str) -> integrate.System:
     return integrate.prepare(config, track(config))
 
 
-def _dataset(
-    config: Config, gains: npt.NDArray[np.float64], passages: Passages, histories: bool
-) -> xr.Dataset:
+def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: bool) -> xr.Dataset:
     one, way = ("sample",), course(config)
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)

@@ -12,17 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.mechanics.course import course
 from maglev.mechanics.reduction import ReducedGuideway
 from maglev.parameters import Config
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 QUIET_CUTOFF = 100.0
 """Highest mode of quiet spans and their piers that is stepped [Hz]; assumed, checked in
@@ -122,14 +118,14 @@ def top_mass(reduced: ReducedGuideway, time_step: float) -> sp.csr_array:
     return _without_noise(reduced.top_mass) + time_step**2 / 12 * top_stiffness(reduced)
 
 
-def _without_noise(matrix: Array) -> sp.csr_array:
+def _without_noise(matrix: FloatArray) -> sp.csr_array:
     scale = np.sqrt(np.diagonal(matrix))
     return sp.csr_array(np.where(np.abs(matrix) > 1e-10 * np.outer(scale, scale), matrix, 0.0))
 
 
 def stepped_mass(
     reduced: ReducedGuideway, stepped: BoolArray, time_step: float
-) -> tuple[IntArray, Array]:
+) -> tuple[IntArray, FloatArray]:
     """Active pier tops, and the lower Cholesky factor of their mass in a step.
 
     Modes that are not stepped follow the tops with their mass.  A share Δt²/12 of the stiffness

@@ -11,11 +11,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
+from maglev.arrays import FloatArray
 
 Motion = Mapping[int, float]
 """Motion of a place in one direction: metres (or radians) per unit of each degree of freedom."""

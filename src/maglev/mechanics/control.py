@@ -11,12 +11,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from maglev.arrays import FloatArray
 from maglev.errors import UserError
 from maglev.parameters import Circuit
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -33,8 +31,8 @@ class Grouping:
         Whether the forces go by the mean gap of the magnet instead of each pole's own.
     """
 
-    feed: Array
-    drive: Array
+    feed: FloatArray
+    drive: FloatArray
     mean_gap_force: bool
 
 
@@ -102,7 +100,7 @@ class LateCurrent:
     """
 
     behind: int
-    delayed: Array
+    delayed: FloatArray
     decay: float
     now: float
     before: float
@@ -154,5 +152,11 @@ def late_current(lag: float, delay: float, time_step: float) -> LateCurrent:
 
 
 def circuits(circuit: Circuit, n_poles: int) -> Grouping:
-    """Circuits of a magnet by the configuration, see `grouping`."""
+    """Circuits of a magnet by the configuration, see `grouping`.
+
+    Examples
+    --------
+    >>> circuits(Circuit(group="lumped"), 4).feed
+    array([[0.25, 0.25, 0.25, 0.25]])
+    """
     return grouping(circuit.group, n_poles)

@@ -125,7 +125,14 @@ def _start(config: Config, advance: float) -> float:
 
 
 def track_range(config: Config) -> tuple[float, float]:
-    """First and last place at which the irregularity is needed [m], zero at the first pier."""
+    """First and last place at which the irregularity is needed [m], zero at the first pier.
+
+    Examples
+    --------
+    >>> start, end = track_range(Config())
+    >>> start < 0.0 < Config().guideway.length < end
+    True
+    """
     length = config.train.length
     margin = config.train.car_pitch  # assumed: room at both ends for whatever stands ahead
     return -config.passage.approach - length - margin, config.guideway.length + length + margin

@@ -17,12 +17,11 @@ import numpy.typing as npt
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
+from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.mechanics import timoshenko
-from maglev.mechanics.timoshenko import PITCH, ROLL, YAW, FloatArray, X, Y, Z
+from maglev.mechanics.timoshenko import PITCH, ROLL, YAW, X, Y, Z
 from maglev.parameters import BeamSection, Guideway, Pier
-
-IntArray = npt.NDArray[np.int64]
 
 RIGHT, LEFT = 1, -1
 """The two rails."""

@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from maglev.arrays import BoolArray, FloatArray
 from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import packing
@@ -42,8 +42,6 @@ from maglev.mechanics.step_limit import (
 )
 from maglev.parameters import Config
 
-Array = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class System:
@@ -59,7 +57,7 @@ class System:
     grounds: tuple[packing.Ground, packing.Ground]
     spans: Spans
     parts: tuple[Block, ...]
-    safe_gains: Array
+    safe_gains: FloatArray
     config: Config
 
 
@@ -120,7 +118,7 @@ def prepare(config: Config, profile: Profile) -> System:
 
 def integrate(
     system: System,
-    gains: Array,
+    gains: FloatArray,
     *,
     profile_of: Callable[[int], Profile] | None = None,
     record_every: int = 0,
@@ -228,7 +226,7 @@ def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ..
         )
 
 
-def _mean_gains(config: Config) -> Array:
+def _mean_gains(config: Config) -> FloatArray:
     return np.array([*config.gains.as_row, *config.gains.further])
 
 
@@ -248,12 +246,12 @@ def _gathered(
     n_samples: int,
     system: System,
     run: Run,
-    too_fast: npt.NDArray[np.bool_],
+    too_fast: BoolArray,
 ) -> Passages:
     n_cars = system.vehicle.body_z.size
     n_magnets = system.train.magnets.x.size
 
-    def samples_first(name: str) -> npt.NDArray[np.float64]:
+    def samples_first(name: str) -> FloatArray:
         rows = np.concatenate([getattr(outcome, name) for outcome in outcomes], axis=-1)
         return np.moveaxis(rows, -1, 0)[:n_samples]
 

@@ -14,10 +14,9 @@ import numpy.typing as npt
 from scipy.fft import ifft, next_fast_len
 from scipy.interpolate import CubicSpline
 
+from maglev.arrays import ComplexArray, FloatArray
 from maglev.errors import UserError
 from maglev.parameters import GermanLaw, Irregularity, PowerLaw, RationalLaw, Spectrum
-
-FloatArray = npt.NDArray[np.float64]
 
 PROFILE_NAMES = ("vertical_right", "vertical_left", "lateral_right", "lateral_left")
 """Order of the ``profile`` dimension."""
@@ -104,6 +103,12 @@ def profile(
     References
     ----------
     Shinozuka, Deodatis, Appl. Mech. Rev. 44 (1991) 191-204, eq. 19; docs/theory/irregularity.md.
+
+    Examples
+    --------
+    >>> found = profile(Irregularity(), (-50.0, 100.0), seed=1)
+    >>> found.values.shape[0]  # both rails, vertical and lateral
+    4
     """
     start, end = length_range
     if not (math.isfinite(start) and math.isfinite(end) and start < end):
@@ -156,6 +161,12 @@ def displacement(profile: Profile, x: npt.ArrayLike) -> tuple[FloatArray, FloatA
     ------
     UserError
         If a place lies outside the grid.
+
+    Examples
+    --------
+    >>> ramp = Profile(x0=0.0, dx=1.0, values=np.array([[0.0, 2.0]]), slopes=np.full((1, 2), 2.0))
+    >>> displacement(ramp, 0.25)
+    (array([0.5]), array([2.]))
     """
     position = (np.asarray(x, dtype=float) - profile.x0) / profile.dx
     n = profile.values.shape[1]
@@ -199,6 +210,13 @@ def mean_displacement(
     ------
     UserError
         If a face reaches beyond the grid.
+
+    Examples
+    --------
+    >>> x = np.arange(4.0)
+    >>> ramp = Profile(x0=0.0, dx=1.0, values=2.0 * x[None], slopes=np.full((1, 4), 2.0))
+    >>> mean_displacement(ramp, [1.5], 1.0)
+    (array([[3.]]), array([[2.]]))
     """
     x = np.asarray(x, dtype=float)
     if length == 0:
@@ -246,6 +264,12 @@ def spectral_density(spectrum: Spectrum, wavenumber: npt.ArrayLike) -> FloatArra
     References
     ----------
     docs/theory/irregularity.md, eqs. 1 to 3.
+
+    Examples
+    --------
+    >>> from maglev.parameters import PowerLaw
+    >>> spectral_density(PowerLaw(law="power", coefficient=1e-8, exponent=2.0), [0.1])
+    array([1.e-06])
     """
     n = np.asarray(wavenumber, dtype=float)
     match spectrum:
@@ -286,6 +310,12 @@ def wavenumbers(irregularity: Irregularity) -> tuple[FloatArray, float]:
         n_k [1/m].
     spacing
         Width of a cell [1/m].
+
+    Examples
+    --------
+    >>> wavenumber, spacing = wavenumbers(Irregularity(n_harmonics=100))
+    >>> bool(np.isclose(np.diff(wavenumber), spacing).all())
+    True
     """
     lowest = 1 / irregularity.wavelength_max
     spacing = (1 / irregularity.wavelength_min - lowest) / irregularity.n_harmonics
@@ -330,7 +360,7 @@ def _random(
 
 
 def _harmonic_sum(
-    coefficient: npt.NDArray[np.complex128],
+    coefficient: ComplexArray,
     wavenumber: FloatArray,
     spacing: float,
     first: int,

@@ -16,20 +16,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 from scipy.optimize import brentq
 from scipy.sparse.csgraph import connected_components
 
-from maglev.arrays import ComplexArray
+from maglev.arrays import ComplexArray, FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.mechanics.car import N_BOGIES, N_C_FRAMES
 from maglev.mechanics.control import circuits
 from maglev.mechanics.train import TrainModel, pole_offsets, pole_static_force
 from maglev.parameters import Circuit, Control
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 GAINS_OF_KIND = ((0, 1, 4, 5), (2, 3, 6, 7))
 """Places of k_p, k_d, k_a, k_i among the eight gains: of suspension, of guidance."""
@@ -66,7 +62,7 @@ class Loop:
     """
 
     fed_by: IntArray
-    pull: Array
+    pull: FloatArray
     lag: float
     delay: float
 
@@ -87,14 +83,16 @@ class Block:
         Of suspension and of guidance.
     """
 
-    shape: Array
-    mass: Array
-    damping: Array
-    stiffness: Array
+    shape: FloatArray
+    mass: FloatArray
+    damping: FloatArray
+    stiffness: FloatArray
     loops: tuple[Loop, Loop]
 
 
-def closing_matrices(train: TrainModel, control: Control) -> tuple[Array, Array, Array]:
+def closing_matrices(
+    train: TrainModel, control: Control
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Stiffness of the magnets at constant current, and force of their circuits per unit of gain.
 
     Parameters
@@ -115,6 +113,15 @@ def closing_matrices(train: TrainModel, control: Control) -> tuple[Array, Array,
     References
     ----------
     docs/theory/control.md, eq. 3.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> attraction, _, _ = closing_matrices(build(config.train), config.control)
+    >>> bool(np.linalg.eigvalsh(attraction)[0] < 0)  # magnets alone are unstable
+    True
     """
     n = train.mass.size
     attraction, drawn = np.zeros((n, n)), (np.zeros((n, n)), np.zeros((n, n)))
@@ -144,8 +151,8 @@ def closing_matrices(train: TrainModel, control: Control) -> tuple[Array, Array,
 
 
 def closed_train(
-    train: TrainModel, gains: Array, control: Control | None = None
-) -> tuple[Array, Array, Array]:
+    train: TrainModel, gains: FloatArray, control: Control | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mass, stiffness and damping of the train with its circuits closed, without lag and delay.
 
     Parameters
@@ -161,6 +168,16 @@ def closed_train(
     Returns
     -------
     mass, stiffness, damping : (dof, dof)
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> mass, stiffness, damping = closed_train(build(config.train), gains)
+    >>> mass.shape == stiffness.shape == damping.shape
+    True
     """
     attraction, *drawn = closing_matrices(train, control or Control())
     mass, damping = np.diag(train.mass), train.damping.toarray()
@@ -172,8 +189,14 @@ def closed_train(
     return mass, stiffness, damping
 
 
-def of_kinds(gains: Array) -> tuple[Array, Array]:
-    """Gains k_p, k_d, k_a, k_i, first of the suspension, then of the guidance."""
+def of_kinds(gains: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Gains k_p, k_d, k_a, k_i, first of the suspension, then of the guidance.
+
+    Examples
+    --------
+    >>> of_kinds(np.arange(8.0))
+    (array([0., 1., 4., 5.]), array([2., 3., 6., 7.]))
+    """
     suspension, guidance = GAINS_OF_KIND
     return gains[list(suspension)], gains[list(guidance)]
 
@@ -192,6 +215,15 @@ def blocks(train: TrainModel, control: Control) -> tuple[Block, ...]:
     -------
     blocks
         Connected coordinates, even or odd from side to side and from end to end.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> parts = blocks(build(config.train), config.control)
+    >>> sum(part.mass.size for part in parts) == build(config.train).mass.size
+    True
     """
     attraction, *drawn = closing_matrices(train, control)
     matrices = (train.stiffness.toarray() + attraction, train.damping.toarray(), *drawn)
@@ -218,12 +250,12 @@ def blocks(train: TrainModel, control: Control) -> tuple[Block, ...]:
     return tuple(found)
 
 
-def _loop(pull: Array, least: float, circuit: Circuit) -> Loop:
+def _loop(pull: FloatArray, least: float, circuit: Circuit) -> Loop:
     fed_by = np.flatnonzero(np.abs(pull).max(axis=0) > least)
     return Loop(fed_by, pull[:, fed_by], circuit.lag, circuit.delay)
 
 
-def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
+def state_matrix(block: Block, gains: FloatArray, n_nodes: int = 0) -> FloatArray:
     """Matrix A of the block's motion as ``dx/dt = A x``.
 
     The state is the motion and its rate, the integral of the signal where k_i is not zero, the
@@ -242,6 +274,16 @@ def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
     References
     ----------
     Breda, Maset and Vermiglio, SIAM J. Sci. Comput. 27 (2005) 482, for the delay.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> part = blocks(build(config.train), config.control)[0]
+    >>> bool(np.linalg.eigvals(state_matrix(part, gains)).real.max() < 0)
+    True
     """
     n = block.mass.size
     sizes = [n, n]
@@ -296,7 +338,9 @@ def state_matrix(block: Block, gains: Array, n_nodes: int = 0) -> Array:
     return state
 
 
-def characteristic(block: Block, gains: Array, s: complex) -> tuple[ComplexArray, ComplexArray]:
+def characteristic(
+    block: Block, gains: FloatArray, s: complex
+) -> tuple[ComplexArray, ComplexArray]:
     """Characteristic matrix of a block at s, and its derivative by s; exact for any delay.
 
     Parameters
@@ -312,6 +356,17 @@ def characteristic(block: Block, gains: Array, s: complex) -> tuple[ComplexArray
     -------
     matrix, slope : (coordinate, coordinate)
         Complex; s is a root where the matrix is singular.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> part = blocks(build(config.train), config.control)[0]
+    >>> matrix, _ = characteristic(part, gains, rightmost(part, gains))
+    >>> bool(np.linalg.cond(matrix) > 1e8)  # singular at a root
+    True
     """
     matrix = np.diag(block.mass * s**2) + block.damping * s + block.stiffness
     slope = np.diag(2 * block.mass * s) + block.damping + 0j
@@ -326,7 +381,7 @@ def characteristic(block: Block, gains: Array, s: complex) -> tuple[ComplexArray
     return matrix, slope
 
 
-def rightmost(block: Block, gains: Array) -> complex:
+def rightmost(block: Block, gains: FloatArray) -> complex:
     """Rightmost root of a block [1/s], of a complex pair the one with positive imaginary part.
 
     Without delay an eigenvalue.  With delay, the one of the collocated delay polished on the
@@ -343,6 +398,16 @@ def rightmost(block: Block, gains: Array) -> complex:
     ------
     RuntimeError
         If the collocation does not settle.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> part = blocks(build(config.train), config.control)[0]
+    >>> rightmost(part, gains).real < 0  # the part is stable
+    True
     """
     if not _late(block):
         roots = scipy.linalg.eigvals(state_matrix(block, gains))
@@ -362,7 +427,7 @@ def rightmost(block: Block, gains: Array) -> complex:
     )
 
 
-def growth_rate(parts: tuple[Block, ...], gains: Array) -> float:
+def growth_rate(parts: tuple[Block, ...], gains: FloatArray) -> float:
     """Fastest growth of a motion of the levitated train on a rigid track [1/s].
 
     Parameters
@@ -380,13 +445,20 @@ def growth_rate(parts: tuple[Block, ...], gains: Array) -> float:
     References
     ----------
     docs/theory/control.md.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> growth_rate(blocks(build(config.train), config.control), gains) < 0
+    True
     """
     return max(rightmost(block, gains).real for block in parts)
 
 
-def modes(
-    parts: tuple[Block, ...], gains: Array
-) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
+def modes(parts: tuple[Block, ...], gains: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """Oscillatory modes of the levitated train, from the slowest.
 
     With delay there are more of them without end, fast and of the circuits; one for each pair of
@@ -405,8 +477,18 @@ def modes(
         With positive imaginary part [1/s]: the frequency is its size.
     shape : (mode, dof)
         Motion of the train's degrees of freedom, complex, without scale.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> roots, shapes = modes(blocks(build(config.train), config.control), gains)
+    >>> bool((roots.real < 0).all())
+    True
     """
-    found: list[tuple[complex, npt.NDArray[np.complex128]]] = []
+    found: list[tuple[complex, ComplexArray]] = []
     for block in parts:
         n = block.mass.size
         roots, shapes = scipy.linalg.eig(state_matrix(block, gains))
@@ -427,7 +509,7 @@ def modes(
 
 
 def border(
-    parts: tuple[Block, ...], gains: Array, gain: int, limit: float, n_steps: int = 24
+    parts: tuple[Block, ...], gains: FloatArray, gain: int, limit: float, n_steps: int = 24
 ) -> float:
     """Value of one gain at the border of stability.
 
@@ -454,6 +536,18 @@ def border(
     ------
     UserError
         If the train is not stable at the start.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.train import build
+    >>> from maglev.parameters import Config
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> gains = np.append(config.gains.as_row, config.gains.further)
+    >>> parts = blocks(build(config.train), config.control)
+    >>> static = config.train.suspension_magnet
+    >>> limit = static.current_reference / static.gap_reference  # k_p that holds at rest
+    >>> border(parts, gains, 0, 0.5 * limit) > limit
+    True
     """
 
     def rate(value: float) -> float:
@@ -477,11 +571,11 @@ def _late(block: Block) -> bool:
     return any(loop.delay > 0.0 and loop.fed_by.size for loop in block.loops)
 
 
-def _rightmost(roots: npt.NDArray[np.complex128]) -> complex:
+def _rightmost(roots: ComplexArray) -> complex:
     return complex(max(roots[roots.imag >= 0], key=lambda root: root.real))
 
 
-def _polished(block: Block, gains: Array, root: complex, shape: ComplexArray) -> complex:
+def _polished(block: Block, gains: FloatArray, root: complex, shape: ComplexArray) -> complex:
     """Newton's method on the characteristic equation, from an eigenvalue and its motion."""
     kept = shape.conj() / (np.abs(shape) ** 2).sum()
     for _ in range(_MOST_STEPS):
@@ -499,7 +593,7 @@ def _polished(block: Block, gains: Array, root: complex, shape: ComplexArray) ->
 
 
 @lru_cache(maxsize=8)
-def _differentiation(n: int) -> Array:
+def _differentiation(n: int) -> FloatArray:
     """Derivatives at the Chebyshev nodes cos(πk/n) of the polynomial through values there."""
     x = np.cos(np.pi * np.arange(n + 1) / n)
     weight = (-1.0) ** np.arange(n + 1)
@@ -510,7 +604,7 @@ def _differentiation(n: int) -> Array:
     return slope
 
 
-def _families(train: TrainModel) -> list[Array]:
+def _families(train: TrainModel) -> list[FloatArray]:
     """Motions even or odd from side to side and from end to end, in orthonormal columns."""
     n_cars = train.car_body_dof.shape[0]
     place = {name: dof for dof, name in enumerate(train.dof_names)}

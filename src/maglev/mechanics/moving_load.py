@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from maglev.arrays import FloatArray
 from maglev.errors import UserError
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,6 +170,14 @@ def midspan_deflection(
     References
     ----------
     Frýba, Vibration of Solids and Structures under Moving Loads (1999), ch. 3.
+
+    Examples
+    --------
+    >>> span = {"length": 24.8, "bending_stiffness": 2.5e10, "mass_per_length": 4000.0}
+    >>> beam = Beam(**span, damping_ratio=0.02)
+    >>> slow = midspan_deflection(beam, 2e4, 100.0, 1.0, [60.0])  # a load of 100 m at 1 m/s
+    >>> bool(np.isclose(slow[0], beam.static_deflection(2e4), rtol=1e-2))
+    True
     """
     if not (speed > 0 and load_length > 0):
         raise UserError(
@@ -210,6 +217,12 @@ def dynamic_factor(beam: Beam, load_length: float, speed: float) -> float:
     ------
     UserError
         If the load is shorter than the beam, or as `midspan_deflection`.
+
+    Examples
+    --------
+    >>> span = {"length": 24.8, "bending_stiffness": 2.5e10, "mass_per_length": 4000.0}
+    >>> round(dynamic_factor(Beam(**span, damping_ratio=0.02), 100.0, 5.0), 2)
+    1.0
     """
     if load_length < beam.length:
         raise UserError(

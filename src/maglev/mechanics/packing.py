@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics._records import (
@@ -31,9 +31,6 @@ from maglev.mechanics.responses import acceleration_filter
 from maglev.mechanics.step_limit import step_response
 from maglev.parameters import Circuit, Config, Guideway, Magnet
 
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-
 
 @dataclass(frozen=True)
 class Ground:
@@ -49,10 +46,10 @@ class Ground:
         Standing sag in the direction of the irregularity [m], and its derivative along travel [-].
     """
 
-    x: Array
+    x: FloatArray
     pole_length: float
-    sag: Array
-    sag_slope: Array
+    sag: FloatArray
+    sag_slope: FloatArray
 
 
 def vehicle(train: train_model.TrainModel) -> Vehicle:
@@ -116,7 +113,7 @@ def magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
     )
 
 
-def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: Array) -> Law:
+def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: FloatArray) -> Law:
     """Circuits of one kind of magnet for the kernels.
 
     Parameters
@@ -223,7 +220,7 @@ def _magnet(config: Config, rows: MagnetRows) -> Magnet:
 
 def tracks(
     config: Config, grounds: tuple[Ground, Ground], profiles: Sequence[Profile]
-) -> list[tuple[Array, Array]]:
+) -> list[tuple[FloatArray, FloatArray]]:
     """For each kind of pole what it meets at its places, and its rate (place, side, profile)."""
     met = []
     for ground, rows in zip(grounds, (slice(0, 2), slice(2, 4)), strict=True):
@@ -241,9 +238,9 @@ def _standing_sag(
     rows: MagnetRows,
     guideway: guideway_model.GuidewayModel,
     reduced: ReducedGuideway,
-    x: Array,
+    x: FloatArray,
     advance: float,
-) -> tuple[Array, Array]:
+) -> tuple[FloatArray, FloatArray]:
     """Sag of the rails under poles at ``x`` beyond that of the modes, and its slope along x.
 
     The slope under a face is its mean over a step, as that of `face_weights`.
@@ -284,14 +281,14 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
     ]
     least = 1e-9 * max(np.abs(z).max() for z in rails[0])
 
-    def moving(*kinds: list[Array]) -> list[IntArray]:
+    def moving(*kinds: list[FloatArray]) -> list[IntArray]:
         """Columns of each span that move its rails."""
         return [
             np.flatnonzero(sum(np.abs(one).max(axis=1) for one in shapes) > least)
             for shapes in zip(*kinds, strict=True)
         ]
 
-    def stacked(shapes: list[Array], chosen: list[IntArray]) -> Array:
+    def stacked(shapes: list[FloatArray], chosen: list[IntArray]) -> FloatArray:
         return np.concatenate([one[which] for one, which in zip(shapes, chosen, strict=True)])
 
     def numbered(chosen: list[IntArray]) -> tuple[IntArray, IntArray]:
@@ -349,7 +346,7 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
     )
 
 
-def _relative(reduced: ReducedGuideway, span: int, shape: Array) -> Array:
+def _relative(reduced: ReducedGuideway, span: int, shape: FloatArray) -> FloatArray:
     """Motion (column, …) in a span when its modes count from where the pier tops take them."""
     columns, own = reduced.span_coordinates[span], reduced.own_modes(span)
     tops = columns[own.size :] - reduced.n_modes
@@ -371,7 +368,7 @@ def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array
     return damping
 
 
-def _whole_and_short(matrix: sp.csr_array, always: npt.NDArray[np.bool_]) -> sp.csr_array:
+def _whole_and_short(matrix: sp.csr_array, always: BoolArray) -> sp.csr_array:
     """The rows of a matrix, then the same without columns that are not stepped in all stretches.
 
     Short rows are those of quiet spans.
@@ -436,7 +433,7 @@ def _stretches(
     )
 
 
-def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, Array]:
+def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, FloatArray]:
     """Row starts, columns and values of a sparse matrix in order."""
     rows = matrix.tocsr().sorted_indices()
     return rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data

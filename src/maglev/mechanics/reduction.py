@@ -17,11 +17,10 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
+from maglev.arrays import FloatArray, IntArray
 from maglev.mechanics import guideway as full
 from maglev.mechanics import timoshenko
 from maglev.parameters import Guideway
-
-Array = npt.NDArray[np.float64]
 
 _SAG_POINTS = 32
 """Places within a pole pitch at which the standing sag is tabulated [-]; assumed."""
@@ -65,19 +64,19 @@ class ReducedGuideway:
 
     parameters: Guideway
     n_modes: int
-    span_coordinates: tuple[npt.NDArray[np.int64], ...]
-    top_mass: Array
+    span_coordinates: tuple[IntArray, ...]
+    top_mass: FloatArray
     stiffness: sp.csr_array
     carried: sp.csr_array
     relative_damping: sp.csr_array
-    rail_z: tuple[Array, ...]
-    rail_roll: tuple[Array, ...]
-    rail_y: tuple[Array, ...]
-    midspan_z: Array
-    midspan_y: Array
-    rest_z: Array
-    rest_roll: Array
-    rest_y: Array
+    rail_z: tuple[FloatArray, ...]
+    rail_roll: tuple[FloatArray, ...]
+    rail_y: tuple[FloatArray, ...]
+    midspan_z: FloatArray
+    midspan_y: FloatArray
+    rest_z: FloatArray
+    rest_roll: FloatArray
+    rest_y: FloatArray
     basis: sp.csr_array
 
     @property
@@ -85,7 +84,7 @@ class ReducedGuideway:
         """Number of coordinates [-]."""
         return int(self.stiffness.shape[0])
 
-    def own_modes(self, span: int) -> npt.NDArray[np.int64]:
+    def own_modes(self, span: int) -> IntArray:
         """Coordinates of a span's own modes, those of its pier tops left out (mode,)."""
         columns = self.span_coordinates[span]
         return columns[columns < self.n_modes]
@@ -110,7 +109,7 @@ class ReducedGuideway:
         return (self.relative.T @ self.relative_damping @ self.relative).tocsr()
 
 
-def rail_nodes(n_connectors: int) -> Array:
+def rail_nodes(n_connectors: int) -> FloatArray:
     """Ends and connectors of a unit of rail, from its start in connector spacings (node,) [-].
 
     Between them the rail is a beam element, whose shapes the motion of its nodes goes through, and
@@ -122,7 +121,7 @@ def rail_nodes(n_connectors: int) -> Array:
 
 def rail_weights(
     guideway: Guideway, x: npt.ArrayLike, *, lateral: bool
-) -> tuple[npt.NDArray[np.int64], Array, Array]:
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """Weights of the rail coefficients of a span in the motion of places along it.
 
     Parameters
@@ -176,10 +175,10 @@ class FaceWeights:
         Of the coefficients in its derivative as the face moves on [1/m].
     """
 
-    first: npt.NDArray[np.int64]
-    start: npt.NDArray[np.int64]
-    weight: Array
-    slope: Array
+    first: IntArray
+    start: IntArray
+    weight: FloatArray
+    slope: FloatArray
 
 
 def face_weights(
@@ -244,9 +243,7 @@ def face_weights(
     return FaceWeights(first, start, weight, slope)
 
 
-def _met(
-    joints: Array, low: Array, high: Array
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _met(joints: FloatArray, low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
     """First and last piece of rail under stretches; off the guideway, the nearest piece."""
     last = joints.size - 2
     rear = np.clip(np.searchsorted(joints, low + 1e-9, side="right") - 1, 0, last)
@@ -256,11 +253,11 @@ def _met(
 
 def _add_means(
     guideway: Guideway,
-    low: Array,
-    high: Array,
+    low: FloatArray,
+    high: FloatArray,
     factor: float,
-    here: npt.NDArray[np.int64],
-    target: Array,
+    here: IntArray,
+    target: FloatArray,
     *,
     lateral: bool,
 ) -> None:
@@ -282,7 +279,7 @@ def _add_means(
             np.add.at(target, at, values * (0.5 * part * covered)[:, None])
 
 
-def _pieces(guideway: Guideway) -> Array:
+def _pieces(guideway: Guideway) -> FloatArray:
     """Joints between pieces of rail, from the first pier to the last [m]."""
     rail = guideway.rail
     spacing = guideway.span_length / (rail.units_per_span * rail.connectors_per_unit)
@@ -292,15 +289,15 @@ def _pieces(guideway: Guideway) -> Array:
     return np.append((np.arange(n_units)[:, None] * unit + nodes).ravel(), n_units * unit)
 
 
-def _coefficient_of(guideway: Guideway, piece: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _coefficient_of(guideway: Guideway, piece: IntArray) -> IntArray:
     """First of the four coefficients of a piece of rail, counted along the whole guideway."""
     per_unit = guideway.rail.connectors_per_unit + 1
     return 2 * (piece + piece // per_unit)
 
 
 def _piece_weights(
-    guideway: Guideway, piece: npt.NDArray[np.int64], x: Array, *, lateral: bool
-) -> tuple[npt.NDArray[np.int64], Array, Array]:
+    guideway: Guideway, piece: IntArray, x: FloatArray, *, lateral: bool
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """As `rail_weights`, along the whole guideway and for places on known pieces of rail."""
     rail = guideway.rail
     joints = _pieces(guideway)
@@ -326,7 +323,7 @@ def standing_sag(
     *,
     lateral: bool,
     pole_length: float = 0.0,
-) -> tuple[Array, Array, Array]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Static sag of the rails under a row of poles, less the part that the kept modes represent.
 
     The bays between connectors follow the poles at once: their modes lie far above the cut-off.
@@ -470,7 +467,7 @@ def reduce(
     )
 
 
-def _component_modes(model: full.GuidewayModel, dof: npt.NDArray[np.int64], cutoff: float) -> Array:
+def _component_modes(model: full.GuidewayModel, dof: IntArray, cutoff: float) -> FloatArray:
     """Modes of the component ``dof`` with all other degrees of freedom fixed."""
     stiffness = model.stiffness[dof][:, dof].toarray()
     mass = model.mass[dof][:, dof].toarray()
@@ -484,14 +481,14 @@ def _component_modes(model: full.GuidewayModel, dof: npt.NDArray[np.int64], cuto
 
 def _basis(
     model: full.GuidewayModel, kinds: list[int], cutoffs: tuple[float, float]
-) -> tuple[sp.csr_array, sp.csr_array, list[npt.NDArray[np.int64]]]:
+) -> tuple[sp.csr_array, sp.csr_array, list[IntArray]]:
     """Shapes of all coordinates, shares of modes carried by pier tops, columns of each span."""
     n_dof = model.mass.shape[0]
     tops = model.pier_top_dof.reshape(-1)
     parts = [(dof, ("span", kind)) for dof, kind in zip(model.span_dof, kinds, strict=True)]
     parts += [(dof, ("pier", 0)) for dof in model.pier_dof]
-    modes: dict[tuple[str, int], Array] = {}  # all parts of a kind are alike
-    constraints: dict[tuple[str, int], Array] = {}
+    modes: dict[tuple[str, int], FloatArray] = {}  # all parts of a kind are alike
+    constraints: dict[tuple[str, int], FloatArray] = {}
     modal, static, carried = [], [], []
     for dof, kind in parts:
         coupling = model.stiffness[dof][:, tops].tocsr()
@@ -544,7 +541,9 @@ def _pruned_to(matrix: sp.csr_array, drop: float) -> sp.csr_array:
     return sp.csr_array((coo.data[keep], (coo.row[keep], coo.col[keep])), shape=matrix.shape)
 
 
-def _relative_damping(reduced: ReducedGuideway, bearings: Array, cutoff: float) -> sp.csr_array:
+def _relative_damping(
+    reduced: ReducedGuideway, bearings: FloatArray, cutoff: float
+) -> sp.csr_array:
     """Damping: a given share of critical up to the cut-off, a constant rate beyond.
 
     Acts on relative rates, where the matrix is closest to its diagonal.
@@ -586,7 +585,7 @@ def _rail_nodes_rows(
 
 def _rest_at_midspan(
     model: full.GuidewayModel, reduced: ReducedGuideway
-) -> tuple[Array, Array, Array]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Flexibility of midspan to forces on the rails of the middle span by left-out modes [m/N].
 
     z under the coefficients of z, y under those of roll and of y.
@@ -609,8 +608,8 @@ def _rail_pieces(
     model: full.GuidewayModel,
     basis: sp.csr_array,
     span: int,
-    columns: npt.NDArray[np.int64],
-) -> tuple[Array, Array, Array]:
+    columns: IntArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Coefficients (column, coefficient) of the rails' z, roll and y along one span."""
     shapes = basis[:, columns].toarray()
     return tuple((rows @ shapes).T for rows in _rail_nodes_rows(model, span))

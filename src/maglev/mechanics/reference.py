@@ -22,6 +22,7 @@ from scipy.signal import sosfilt
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course
@@ -35,9 +36,6 @@ from maglev.mechanics.responses import (
     checked_gains,
 )
 from maglev.parameters import Config
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 FIRST_STEP = 0.36e-3
 """Longest first step [s]: 100 Hz, the upper end of the band, turn by 0.23 in it, which lengthens
@@ -84,11 +82,11 @@ class Energy:
         Kinetic and strain energy of train and guideway.
     """
 
-    time: Array
-    work_on_train: Array
-    work_on_guideway: Array
-    dissipated: Array
-    stored: Array
+    time: FloatArray
+    work_on_train: FloatArray
+    work_on_guideway: FloatArray
+    dissipated: FloatArray
+    stored: FloatArray
 
 
 @dataclass
@@ -96,7 +94,7 @@ class Fate:
     """End of each passage, as in `maglev.mechanics.responses.Passages`."""
 
     status: IntArray
-    lost_time: Array
+    lost_time: FloatArray
     lost_magnet: IntArray
 
     @classmethod
@@ -133,17 +131,17 @@ class Record:
         How it ended.
     """
 
-    time: Array
-    girder: Array
-    body_z: Array
-    body_y: Array
-    gap_min: Array
-    gap_max: Array
-    current_max: Array
-    gap: Array
-    current: Array
-    power: Array
-    stored: Array
+    time: FloatArray
+    girder: FloatArray
+    body_z: FloatArray
+    body_y: FloatArray
+    gap_min: FloatArray
+    gap_max: FloatArray
+    current_max: FloatArray
+    gap: FloatArray
+    current: FloatArray
+    power: FloatArray
+    stored: FloatArray
     fate: Fate
 
 
@@ -157,7 +155,7 @@ def _blank(of: System, n_steps: int, n_records: int) -> Record:
         for name in ("gap_reference", "current_reference")
     )
 
-    def filled(n: int, value: npt.ArrayLike) -> Array:
+    def filled(n: int, value: npt.ArrayLike) -> FloatArray:
         value = np.asarray(value)
         return np.zeros((n, value.shape[0], n_samples)) + value
 
@@ -227,7 +225,7 @@ def _note(record: Record, step: int, every: int, of: System, at: Watch, state: S
         record.gap[row], record.current[row] = at.per_magnet @ gap, at.per_magnet @ current
 
 
-def _power(of: System, state: State) -> Array:
+def _power(of: System, state: State) -> FloatArray:
     """Power of the magnets on train and guideway, and dissipated power [W], (3, sample)."""
     v_t, v_g = state.train.v, state.guideway.v
     lost = of.train.dissipated(v_t) + of.guideway.dissipated(v_g)
@@ -238,7 +236,7 @@ def _power(of: System, state: State) -> Array:
     return np.stack([on_train, on_guideway, lost])
 
 
-def _stored(of: System, state: State) -> Array:
+def _stored(of: System, state: State) -> FloatArray:
     """Kinetic and strain energy [J], (sample,)."""
     total = np.zeros(of.n_samples)
     for part, motion in ((of.train, state.train), (of.guideway, state.guideway)):
@@ -262,7 +260,7 @@ def _judge(fate: Fate, of: System, state: State, time: float) -> None:
         _rest(state, of, lost)
 
 
-def _rest(state: State, of: System, which: npt.NDArray[np.bool_]) -> None:
+def _rest(state: State, of: System, which: BoolArray) -> None:
     """Put samples back to rest."""
     still = at_rest(of)
     pairs = [
@@ -284,7 +282,7 @@ def _rest(state: State, of: System, which: npt.NDArray[np.bool_]) -> None:
 def passed(
     config: Config,
     profile: Profile,
-    gains: Array,
+    gains: FloatArray,
     step: float,
     n_steps: int,
     *,
@@ -415,7 +413,7 @@ class Effort:
 
     step: float
     n_steps: int
-    error: Array
+    error: FloatArray
     seconds: float
 
     @property
@@ -509,7 +507,7 @@ def solve(
 def extrapolated(coarse: Record, fine: Record) -> Record:
     """Richardson extrapolation of the responses from two runs, one with twice the step."""
 
-    def better(name: str) -> Array:
+    def better(name: str) -> FloatArray:
         one, other = getattr(coarse, name), getattr(fine, name)
         correction = (other[1::2] - one) / 3
         return other + CubicSpline(coarse.time, correction)(fine.time)
@@ -520,7 +518,7 @@ def extrapolated(coarse: Record, fine: Record) -> Record:
     return replace(fine, fate=fate, **changed)
 
 
-def six_extremes(record: Record) -> Array:
+def six_extremes(record: Record) -> FloatArray:
     """Extremes (sample, response): girder as in `GIRDER_RESPONSES`, then largest of the cars."""
     status = record.fate.status
     girder, z, y = (
@@ -530,7 +528,7 @@ def six_extremes(record: Record) -> Array:
     return np.column_stack([girder, z.max(axis=1), y.max(axis=1)])
 
 
-def _estimated_error(better: Array, fine: Array, before: Array | None) -> Array:
+def _estimated_error(better: FloatArray, fine: FloatArray, before: FloatArray | None) -> FloatArray:
     """Error of extrapolated extremes (sample, response), as a share of them.
 
     Parameters
@@ -559,7 +557,7 @@ def _told(effort: Effort) -> str:
     )
 
 
-def _worst(error: Array) -> Array:
+def _worst(error: FloatArray) -> FloatArray:
     """Largest error of each response over the samples that were not lost; 0 if all were."""
     return np.where(np.isnan(error), 0.0, error).max(axis=0)
 
@@ -572,7 +570,7 @@ def passages_of(record: Record, every: int) -> Passages:
     body_y, body_y_time = extremes(record.body_y, record.time, status)
     kept = slice(every - 1, None, every) if every else slice(0, 0)
 
-    def samples_first(history: Array) -> Array:
+    def samples_first(history: FloatArray) -> FloatArray:
         return np.moveaxis(history, (0, 1, 2), (2, 1, 0))
 
     return Passages(
@@ -597,7 +595,9 @@ def passages_of(record: Record, every: int) -> Passages:
     )
 
 
-def extremes(history: Array, time: Array, status: IntArray) -> tuple[Array, Array]:
+def extremes(
+    history: FloatArray, time: FloatArray, status: IntArray
+) -> tuple[FloatArray, FloatArray]:
     """Largest absolute values: vertices of parabolas through three steps.
 
     Parameters

@@ -15,15 +15,13 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.interpolate import CubicHermiteSpline, PPoly
 
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import timoshenko
 from maglev.mechanics import train as train_model
 from maglev.mechanics.control import circuits as grouping_of
 from maglev.mechanics.irregularity import Profile
 from maglev.parameters import Config
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 _GAUSS = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3)  # exact for cubics, the shapes of a beam
 
@@ -51,17 +49,17 @@ class Poles:
     """
 
     magnet: IntArray
-    x: Array
-    face: Array
-    is_guidance: npt.NDArray[np.bool_]
+    x: FloatArray
+    face: FloatArray
+    is_guidance: BoolArray
     side: IntArray
-    opening: Array
+    opening: FloatArray
     opens: sp.csr_array
-    static_force: Array
-    constant: Array
-    gap: Array
-    current: Array
-    current_max: Array
+    static_force: FloatArray
+    constant: FloatArray
+    gap: FloatArray
+    current: FloatArray
+    current_max: FloatArray
 
 
 def poles_of(train: train_model.TrainModel) -> Poles:
@@ -82,7 +80,7 @@ def poles_of(train: train_model.TrainModel) -> Poles:
         shape=(number.size, train.mass.size),
     )
 
-    def of_kind(name: str) -> Array:
+    def of_kind(name: str) -> FloatArray:
         return np.where(is_guidance, getattr(kinds[1], name), getattr(kinds[0], name))[:, None]
 
     static_force = np.concatenate([static[m, : k.n_poles] for m, k in enumerate(kind)])[:, None]
@@ -128,7 +126,7 @@ class Rails:
         self.ends = sp.csr_array((share, (row, dof)), shape=(n_rows, model.n_dof))
         self.ends_transposed = self.ends.T.tocsr()
 
-    def under(self, x: Array, speed: float, step: float) -> tuple[sp.csr_array, sp.csr_array]:
+    def under(self, x: FloatArray, speed: float, step: float) -> tuple[sp.csr_array, sp.csr_array]:
         """Rows of the mean rail deflection under the faces of poles.
 
         What jumps where a joint passes counts with its mean over one step, so that its impulse does
@@ -163,8 +161,8 @@ class Rails:
 
     def _mean(
         self,
-        shape: Callable[..., Array],
-        x: Array,
+        shape: Callable[..., FloatArray],
+        x: FloatArray,
         width: npt.ArrayLike,
         times: npt.ArrayLike = 1.0,
     ) -> sp.csr_array:
@@ -204,7 +202,7 @@ class Track:
         self.profile = np.where(poles.is_guidance, 2, 0) + np.where(poles.side > 0, 0, 1)
         self.face = poles.face
 
-    def under(self, x: Array, speed: float) -> tuple[Array, Array]:
+    def under(self, x: FloatArray, speed: float) -> tuple[FloatArray, FloatArray]:
         """Mean irregularity [m] over each face centred at ``x`` [m] and its rate [m/s].
 
         All are (time, pole).
@@ -252,18 +250,18 @@ class Circuits:
     feed: sp.csr_array
     drive: sp.csr_array
     force_gap: sp.csr_array
-    proportional: Array
-    derivative: Array
-    acceleration: Array
-    integral: Array
-    decay: Array
-    newest: Array
-    taps: tuple[tuple[int, Array], ...]
-    current: Array
-    current_max: Array
+    proportional: FloatArray
+    derivative: FloatArray
+    acceleration: FloatArray
+    integral: FloatArray
+    decay: FloatArray
+    newest: FloatArray
+    taps: tuple[tuple[int, FloatArray], ...]
+    current: FloatArray
+    current_max: FloatArray
     step: float
 
-    def delayed(self, signals: deque[Array]) -> Array:
+    def delayed(self, signals: deque[FloatArray]) -> FloatArray:
         """Part of the delayed signal (circuit, sample) [A] due to earlier steps."""
         total = np.zeros_like(self.proportional)
         for back, weight in self.taps:
@@ -272,7 +270,7 @@ class Circuits:
         return total
 
     @property
-    def at_once(self) -> Array:
+    def at_once(self) -> FloatArray:
         """Weight (circuit, 1) of the signal of this step in the delayed signal [-]."""
         return sum((weight for back, weight in self.taps if back == 0), np.zeros_like(self.current))
 
@@ -291,11 +289,11 @@ class Charge:
         u of the last steps, the latest last [A].
     """
 
-    error: Array
-    integral: Array
-    command: Array
-    current: Array
-    signals: deque[Array]
+    error: FloatArray
+    integral: FloatArray
+    command: FloatArray
+    current: FloatArray
+    signals: deque[FloatArray]
 
 
 def delay_taps(delay: float, step: float) -> dict[int, float]:
@@ -336,7 +334,7 @@ def lag_weights(lag: float, step: float) -> tuple[float, float]:
     return decay, 1.0 + math.expm1(-step / lag) * lag / step
 
 
-def circuits_of(config: Config, poles: Poles, gains: Array, step: float) -> Circuits:
+def circuits_of(config: Config, poles: Poles, gains: FloatArray, step: float) -> Circuits:
     """Circuits of every magnet of the train, in the order of its magnets."""
     magnets = (config.train.suspension_magnet, config.train.guidance_magnet)
     controls = (config.control.suspension, config.control.guidance)
@@ -348,10 +346,10 @@ def circuits_of(config: Config, poles: Poles, gains: Array, step: float) -> Circ
     by = [mean[k] if groups[k].mean_gap_force else same[k] for k in (0, 1)]
     kind = np.concatenate([np.full(groups[k].feed.shape[0], k) for k in kinds])
 
-    def blocks(each: list[Array]) -> sp.csr_array:
+    def blocks(each: list[FloatArray]) -> sp.csr_array:
         return sp.csr_array(sp.block_diag([each[k] for k in kinds], format="csr"))
 
-    def column(suspension: float, guidance: float) -> Array:
+    def column(suspension: float, guidance: float) -> FloatArray:
         return np.where(kind == 0, suspension, guidance)[:, None]
 
     lags = [lag_weights(control.lag, step) for control in controls]
@@ -387,8 +385,13 @@ def resting(circuits: Circuits) -> Charge:
 
 
 def charged(
-    circuits: Circuits, before: Charge, known: Array, error: Array, rate: Array, push: Array
-) -> tuple[Charge, Array]:
+    circuits: Circuits,
+    before: Charge,
+    known: FloatArray,
+    error: FloatArray,
+    rate: FloatArray,
+    push: FloatArray,
+) -> tuple[Charge, FloatArray]:
     """The law of control over one step, docs/theory/control.md.
 
     Parameters

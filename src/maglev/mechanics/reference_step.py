@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
+from maglev.arrays import BoolArray, FloatArray
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course
@@ -29,8 +29,6 @@ from maglev.mechanics.reference_magnets import (
     resting,
 )
 from maglev.parameters import Config
-
-Array = npt.NDArray[np.float64]
 
 BETA, GAMMA = 0.25, 0.5
 """Newmark's parameters [-]: constant average acceleration, unconditionally stable."""
@@ -53,9 +51,9 @@ FRESH_TANGENT_EVERY = 6
 class Motion:
     """Displacement, velocity, acceleration of a structure, each (dof, sample)."""
 
-    x: Array
-    v: Array
-    a: Array
+    x: FloatArray
+    v: FloatArray
+    a: FloatArray
 
     @classmethod
     def at_rest(cls, n_dof: int, n_samples: int) -> Motion:
@@ -89,26 +87,26 @@ class Structure:
     step: float
     effective: sp.csc_array
     factors: SuperLU
-    modes: Array
-    coefficient: Array
-    spread: Array
-    gathered: Array
+    modes: FloatArray
+    coefficient: FloatArray
+    spread: FloatArray
+    gathered: FloatArray
 
-    def inner(self, motion: Motion) -> Array:
+    def inner(self, motion: Motion) -> FloatArray:
         """C v + K x, (dof, sample) [N, N m]."""
         inner = self.damping @ motion.v + self.stiffness @ motion.x
         if self.coefficient.size:
             inner += self.modes.T @ (self.coefficient * (self.modes @ motion.v))
         return inner
 
-    def acceleration(self, force: Array) -> Array:
+    def acceleration(self, force: FloatArray) -> FloatArray:
         """Acceleration at the end of the step from the residual force of the predicted motion."""
         a = self.factors.solve(force)
         if self.coefficient.size:
             a -= self.spread.T @ (self.gathered @ (self.spread @ force))
         return a
 
-    def dissipated(self, v: Array) -> Array:
+    def dissipated(self, v: FloatArray) -> FloatArray:
         """Power lost to damping (sample,) [W]."""
         lost = (v * (self.damping @ v)).sum(axis=0)
         if self.coefficient.size:
@@ -121,7 +119,7 @@ class Structure:
         x = before.x + h * before.v + h**2 * (0.5 - BETA) * before.a
         return Motion(x, before.v + h * (1 - GAMMA) * before.a, before.a)
 
-    def moved(self, predicted: Motion, a: Array) -> Motion:
+    def moved(self, predicted: Motion, a: FloatArray) -> Motion:
         """Corrector: the motion a step later with its acceleration ``a`` (dof, sample)."""
         h = self.step
         return Motion(predicted.x + BETA * h**2 * a, predicted.v + GAMMA * h * a, a)
@@ -191,7 +189,7 @@ def system(
     config: Config,
     model: guideway_model.GuidewayModel,
     profile: Profile,
-    gains: Array,
+    gains: FloatArray,
     step: float,
 ) -> System:
     """Constant data of runs with one step length [s] and gains (sample, 8)."""
@@ -217,9 +215,9 @@ def system(
 class Magnets:
     """Gap [m], current [A] and force [N] of every pole, each (pole, sample)."""
 
-    gap: Array
-    current: Array
-    force: Array
+    gap: FloatArray
+    current: FloatArray
+    force: FloatArray
 
 
 @dataclass
@@ -246,9 +244,9 @@ class State:
     guideway: Motion
     charge: Charge
     magnets: Magnets
-    on_train: Array
-    on_guideway: Array
-    before: tuple[Array, Array]
+    on_train: FloatArray
+    on_guideway: FloatArray
+    before: tuple[FloatArray, FloatArray]
     tangents: list[SuperLU]
 
 
@@ -292,7 +290,7 @@ def closed_train(of: System, magnets: Magnets, sample: int) -> SuperLU:
     return _factors(sp.csc_array(of.train.effective + opens.T @ (stiffening - softening) @ opens))
 
 
-def stepped(of: System, state: State, view: View, running: npt.NDArray[np.bool_]) -> State:
+def stepped(of: System, state: State, view: View, running: BoolArray) -> State:
     """One step of Newmark's rule, iterated until the pole forces converge.
 
     Parameters
@@ -360,8 +358,8 @@ class View:
     """
 
     time: float
-    bump: Array
-    bump_rate: Array
+    bump: FloatArray
+    bump_rate: FloatArray
     mean: sp.csr_array
     travel: sp.csr_array
     reached: bool
@@ -389,8 +387,8 @@ def views(of: System, first: int, stop: int) -> Iterator[View]:
 
 
 def _magnets(
-    of: System, before: Charge, known: Array, view: View, train: Motion, guideway: Motion
-) -> tuple[Magnets, Charge, Array]:
+    of: System, before: Charge, known: FloatArray, view: View, train: Motion, guideway: Motion
+) -> tuple[Magnets, Charge, FloatArray]:
     """Gaps, currents and forces of the poles under given motions, and the state of the circuits."""
     poles, circuits = of.poles, of.circuits
     opening = poles.opening[:, None]
@@ -410,12 +408,12 @@ def _magnets(
     return Magnets(gap, current, force), charge, signal
 
 
-def _apart(side_by_side: Array, n: int) -> list[Array]:
+def _apart(side_by_side: FloatArray, n: int) -> list[FloatArray]:
     """Split the columns of one product with a sparse matrix, which is faster than several."""
     return np.split(side_by_side, n, axis=1)
 
 
-def held(of: System, magnets: Magnets) -> npt.NDArray[np.bool_]:
+def held(of: System, magnets: Magnets) -> BoolArray:
     """Which samples (sample,) have every gap between contact and loss."""
     passage = of.config.passage
     between = (magnets.gap > passage.gap_contact) & (magnets.gap < passage.gap_lost)

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.parameters import Passage
-
-Array = npt.NDArray[np.float64]
 
 GIRDER_RESPONSES = (
     "girder_displacement_z",
@@ -50,27 +49,27 @@ class Passages:
         Mean gap of each magnet's poles [m] and mean current [A].
     """
 
-    girder: Array
-    girder_time: Array
-    body_z: Array
-    body_y: Array
-    body_z_time: Array
-    body_y_time: Array
-    gap_min: Array
-    gap_max: Array
-    current_max: Array
-    status: npt.NDArray[np.int64]
-    lost_time: Array
-    lost_magnet: npt.NDArray[np.int64]
-    time: Array
-    girder_history: Array
-    body_z_history: Array
-    body_y_history: Array
-    gap_history: Array
-    current_history: Array
+    girder: FloatArray
+    girder_time: FloatArray
+    body_z: FloatArray
+    body_y: FloatArray
+    body_z_time: FloatArray
+    body_y_time: FloatArray
+    gap_min: FloatArray
+    gap_max: FloatArray
+    current_max: FloatArray
+    status: IntArray
+    lost_time: FloatArray
+    lost_magnet: IntArray
+    time: FloatArray
+    girder_history: FloatArray
+    body_z_history: FloatArray
+    body_y_history: FloatArray
+    gap_history: FloatArray
+    current_history: FloatArray
 
 
-def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4) -> Array:
+def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4) -> FloatArray:
     """Return the gains as (sample, 8) doubles.
 
     Parameters
@@ -103,7 +102,7 @@ def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4)
     return np.ascontiguousarray(array)
 
 
-def acceleration_filter(passage: Passage, time_step: float) -> Array:
+def acceleration_filter(passage: Passage, time_step: float) -> FloatArray:
     """Second-order sections of the low-pass on guideway accelerations; the identity without a band.
 
     Parameters

@@ -6,10 +6,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse.linalg import splu
 
+from maglev.arrays import FloatArray
 from maglev.mechanics.guideway import GuidewayModel
 from maglev.mechanics.train import TrainModel, pole_offsets, pole_static_force
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def midspan_of_middle_span(guideway: GuidewayModel) -> float:

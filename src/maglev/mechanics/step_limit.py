@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
+from maglev.arrays import BoolArray, FloatArray
 from maglev.mechanics import linear
 from maglev.mechanics import train as train_model
 from maglev.mechanics.activity import top_mass, top_stiffness
@@ -19,8 +19,6 @@ from maglev.mechanics.control import late_current
 from maglev.mechanics.linear import Block
 from maglev.mechanics.reduction import ReducedGuideway
 from maglev.parameters import Config
-
-Array = npt.NDArray[np.float64]
 
 DAMPING_MARGIN = 1.4
 """Damping ratio of a component mode on its own over that of the guideway's modes, at most [-];
@@ -78,7 +76,7 @@ def train_parts(config: Config) -> tuple[Block, ...]:
     return linear.blocks(one_car, config.control)
 
 
-def train_limit(parts: tuple[Block, ...], gains: Array, least: float = 1e-5) -> float:
+def train_limit(parts: tuple[Block, ...], gains: FloatArray, least: float = 1e-5) -> float:
     """Largest step at which no motion of the train grows by the step alone [s].
 
     Parameters
@@ -102,7 +100,7 @@ def train_limit(parts: tuple[Block, ...], gains: Array, least: float = 1e-5) -> 
     return stable
 
 
-def step_holds(parts: tuple[Block, ...], gains: Array, time_step: float) -> bool:
+def step_holds(parts: tuple[Block, ...], gains: FloatArray, time_step: float) -> bool:
     """Whether each motion that decays in continuous time also decays in the scheme.
 
     The step tried is longer by a margin: the elastic guideway leaves less room than the rigid track
@@ -119,14 +117,14 @@ def step_holds(parts: tuple[Block, ...], gains: Array, time_step: float) -> bool
     return True
 
 
-def _of_use(matrix: Array) -> Array:
+def _of_use(matrix: FloatArray) -> FloatArray:
     """The matrix without states that influence no other."""
     while not (kept := matrix.any(axis=0)).all():
         matrix = matrix[np.ix_(kept, kept)]
     return matrix
 
 
-def safe_gains(parts: tuple[Block, ...], mean: Array, time_step: float) -> Array:
+def safe_gains(parts: tuple[Block, ...], mean: FloatArray, time_step: float) -> FloatArray:
     """Largest common multiple of the mean gains (8,) at which the step is stable."""
     for times in SAFE_MULTIPLES:
         if step_holds(parts, times * mean, time_step):
@@ -135,8 +133,8 @@ def safe_gains(parts: tuple[Block, ...], mean: Array, time_step: float) -> Array
 
 
 def samples_too_fast(
-    parts: tuple[Block, ...], gains: Array, time_step: float, safe: Array
-) -> npt.NDArray[np.bool_]:
+    parts: tuple[Block, ...], gains: FloatArray, time_step: float, safe: FloatArray
+) -> BoolArray:
     """Samples whose gains exceed the stability limit of the step.
 
     The larger a gain the shorter the step must be: a set of samples whose largest gains, all
@@ -175,7 +173,7 @@ def samples_too_fast(
     return too_fast
 
 
-def step_matrix(block: Block, gains: Array, time_step: float) -> Array:
+def step_matrix(block: Block, gains: FloatArray, time_step: float) -> FloatArray:
     """Transition matrix of a block of the linearised train over one step.
 
     The state is displacement, velocity half a step before, and the accelerations of the last two
@@ -226,7 +224,7 @@ def step_matrix(block: Block, gains: Array, time_step: float) -> Array:
         inertia[:, freedoms] += k_a * way.direct * loop.pull
         rows.append((freedoms, way, k_a, [integral, new_x[freedoms], command, current, *signals]))
     acceleration = np.linalg.solve(inertia, force)
-    memories: list[Array] = []
+    memories: list[FloatArray] = []
     for freedoms, way, k_a, kept in rows:
         answered = k_a * acceleration[freedoms]
         kept[2] = kept[2] + way.undelayed * answered
@@ -257,14 +255,14 @@ def _largest_phase(ratio: float, *, exact: bool = False) -> float:
     return float(phases[grows.argmax()] - 0.02) if grows.any() else float(phases[-1])
 
 
-def stepped_stiffness(reduced: ReducedGuideway) -> Array:
+def stepped_stiffness(reduced: ReducedGuideway) -> FloatArray:
     """Stiffness (coordinate, coordinate) with modes relative to the motion of the pier tops."""
     return scipy.linalg.block_diag(
         np.diag(reduced.stiffness.diagonal()[: reduced.n_modes]), top_stiffness(reduced).toarray()
     )
 
 
-def stepped_inertia(reduced: ReducedGuideway, time_step: float) -> Array:
+def stepped_inertia(reduced: ReducedGuideway, time_step: float) -> FloatArray:
     """Symmetric mass (coordinate, coordinate) of a time step, for `stepped_stiffness`.
 
     A component mode has the inverse of its response as the mass of its own motion, and the pier
@@ -277,7 +275,7 @@ def stepped_inertia(reduced: ReducedGuideway, time_step: float) -> Array:
     return np.block([[own, carried], [carried.T, tops]])
 
 
-def step_response(reduced: ReducedGuideway, time_step: float) -> Array:
+def step_response(reduced: ReducedGuideway, time_step: float) -> FloatArray:
     """Factor on the acceleration of each component mode in a step; one for pier tops.
 
     Verlet's step with sinc²(ωΔt/2) times the acceleration is exact for an undamped mode of circular

@@ -14,10 +14,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from maglev.arrays import FloatArray
 from maglev.errors import UserError
 from maglev.parameters import BeamSection
-
-FloatArray = npt.NDArray[np.float64]
 
 X, Y, Z, ROLL, PITCH, YAW = range(6)
 """Places of a node's degrees of freedom."""
@@ -52,6 +51,13 @@ def shear_flexibility(section: BeamSection, length: npt.ArrayLike) -> tuple[Floa
     References
     ----------
     Przemieniecki, Theory of Matrix Structural Analysis (1968), sec. 5.6.
+
+    Examples
+    --------
+    >>> from maglev.parameters import Guideway
+    >>> vertical, lateral = shear_flexibility(Guideway().girder, 3.0)
+    >>> print(f"{vertical:.2f}")
+    6.02
     """
     L = np.asarray(length, dtype=float)
     if not np.all(L > 0):
@@ -81,6 +87,11 @@ def deflection_shape(length: npt.ArrayLike, phi: npt.ArrayLike, x: npt.ArrayLike
     References
     ----------
     Friedman and Kosmatka, Computers & Structures 47 (1993) 473-481, eq. 16.
+
+    Examples
+    --------
+    >>> deflection_shape(2.0, 0.0, 1.0)  # half of each end's deflection at the middle
+    array([ 0.5 ,  0.25,  0.5 , -0.25])
     """
     L, s = np.asarray(length, dtype=float), np.asarray(x) / length
     phi = np.asarray(phi)
@@ -105,6 +116,11 @@ def slope_shape(length: npt.ArrayLike, phi: npt.ArrayLike, x: npt.ArrayLike) -> 
     -------
     slope : (..., 4)
         Slope of the deflected axis [-] per nodal deflection [m] and slope of the section [rad].
+
+    Examples
+    --------
+    >>> slope_shape(2.0, 0.0, 0.0)  # at its first node
+    array([0., 1., 0., 0.])
     """
     L, s = np.asarray(length, dtype=float), np.asarray(x) / length
     phi = np.asarray(phi)
@@ -133,6 +149,11 @@ def rotation_shape(length: npt.ArrayLike, phi: npt.ArrayLike, x: npt.ArrayLike) 
     References
     ----------
     Friedman and Kosmatka, Computers & Structures 47 (1993) 473-481, eq. 16.
+
+    Examples
+    --------
+    >>> rotation_shape(2.0, 0.5, 0.0)  # at its first node, whatever the shear
+    array([0., 1., 0., 0.])
     """
     L, s = np.asarray(length, dtype=float), np.asarray(x) / length
     phi = np.asarray(phi)
@@ -166,6 +187,13 @@ def displacement_shape(section: BeamSection, length: float, x: npt.ArrayLike) ->
     ------
     UserError
         If ``length`` is not positive.
+
+    Examples
+    --------
+    >>> from maglev.parameters import Guideway
+    >>> rows = displacement_shape(Guideway().girder, 3.0, 1.5)
+    >>> rows.shape
+    (1, 3, 12)
     """
     vertical, lateral = shear_flexibility(section, length)
     x = np.asarray(x, dtype=float)
@@ -200,6 +228,14 @@ def stiffness(section: BeamSection, length: float) -> FloatArray:
     References
     ----------
     Przemieniecki, Theory of Matrix Structural Analysis (1968), sec. 5.6.
+
+    Examples
+    --------
+    >>> from maglev.parameters import Guideway
+    >>> lifted = np.zeros(12)
+    >>> lifted[[2, 8]] = 1.0  # both nodes by 1 m
+    >>> bool(np.abs(stiffness(Guideway().girder, 3.0) @ lifted).max() < 1e-3)
+    True
     """
     vertical, lateral = shear_flexibility(section, length)
     E, G, L = section.elastic_modulus, section.shear_modulus, length
@@ -251,6 +287,15 @@ def mass(section: BeamSection, length: float) -> FloatArray:
     References
     ----------
     Friedman and Kosmatka, Computers & Structures 47 (1993) 473-481, eq. 20.
+
+    Examples
+    --------
+    >>> from maglev.parameters import Guideway
+    >>> girder, lifted = Guideway().girder, np.zeros(12)
+    >>> lifted[[2, 8]] = 1.0
+    >>> whole = lifted @ mass(girder, 3.0) @ lifted
+    >>> bool(np.isclose(whole, 3.0 * girder.mass_per_length))
+    True
     """
     vertical, lateral = shear_flexibility(section, length)
     abscissa, weight = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
@@ -286,6 +331,14 @@ def turned(matrix: npt.ArrayLike, axes: npt.ArrayLike) -> FloatArray:
     -------
     matrix : (12, 12)
         The same for nodal motions in global axes.
+
+    Examples
+    --------
+    >>> axes = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]  # the element along global y
+    >>> diagonal = np.diag(np.arange(12.0))
+    >>> turned(diagonal, axes)[:2, :2]
+    array([[1., 0.],
+           [0., 0.]])
     """
     turn = np.kron(np.eye(4), np.asarray(axes, dtype=float))
     return turn.T @ np.asarray(matrix) @ turn

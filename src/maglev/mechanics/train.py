@@ -11,12 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.mechanics.bodies import FloatArray, IntArray, assembled, link_rows
+from maglev.mechanics.bodies import assembled, link_rows
 from maglev.mechanics.car import (
     LEFT,
     N_C_FRAMES,
@@ -54,7 +54,7 @@ class MagnetTable:
         Car of the magnet; one shared by two cars belongs to the car in front.
     """
 
-    is_guidance: npt.NDArray[np.bool_]
+    is_guidance: BoolArray
     side: IntArray
     x: FloatArray
     translation_dof: IntArray
@@ -127,6 +127,11 @@ def build(train: Train) -> TrainModel:
     References
     ----------
     docs/theory/train.md.
+
+    Examples
+    --------
+    >>> build(Train(n_cars=1)).mass.size  # degrees of freedom
+    101
     """
     preload = _checked_preload(train)
     assembly = Assembly()
@@ -196,6 +201,11 @@ def pole_offsets(magnet: Magnet) -> FloatArray:
     -------
     offset : (pole,)
         x relative to the magnet's centre [m], falling.
+
+    Examples
+    --------
+    >>> bool((np.diff(pole_offsets(Train().suspension_magnet)) < 0.0).all())  # from the front
+    True
     """
     return (0.5 * (magnet.n_poles - 1) - np.arange(magnet.n_poles, dtype=float)) * magnet.pole_pitch
 
@@ -224,6 +234,15 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
     ------
     UserError
         If a pole would have to push, or a single pole to carry a moment.
+
+    Examples
+    --------
+    >>> train = Train(n_cars=1)
+    >>> model = build(train)
+    >>> lifting = ~model.magnets.is_guidance
+    >>> carried = pole_static_force(train, model.magnets)[lifting].sum()
+    >>> bool(np.isclose(carried, model.weight.sum()))  # all of the weight
+    True
     """
     kinds = (train.suspension_magnet, train.guidance_magnet)
     force = np.zeros((magnets.x.size, max(kind.n_poles for kind in kinds)))

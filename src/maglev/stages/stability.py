@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
+from maglev.arrays import FloatArray
 from maglev.mechanics import train as train_model
 from maglev.mechanics.linear import Block, blocks, border, growth_rate
 from maglev.mechanics.responses import checked_gains
@@ -107,7 +107,7 @@ def dataset(config: Config) -> xr.Dataset:
     )
 
 
-def _moved(mean: npt.NDArray[np.float64], k_p: float, k_d: float) -> npt.NDArray[np.float64]:
+def _moved(mean: FloatArray, k_p: float, k_d: float) -> FloatArray:
     gains = mean.copy()
     gains[[PROPORTIONAL, DERIVATIVE]] = k_p, k_d
     return gains
@@ -122,7 +122,7 @@ def _lagging(control: Control, lag: float) -> Control:
 
 def _border(
     parts: tuple[Block, ...],
-    gains: npt.NDArray[np.float64],
+    gains: FloatArray,
     gain: int,
     limit: float,
     n_steps: int = N_STEPS,

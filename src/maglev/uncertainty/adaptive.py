@@ -125,6 +125,13 @@ def absorb(
     References
     ----------
     Mo et al., Water Resour. Res. 53 (2017) 10802–10823; docs/theory/adaptive_sampling.md, sec. 3.
+
+    Examples
+    --------
+    >>> state = AdaptiveState.empty(2, 1)
+    >>> state = absorb(state, [[0.0, 0.0], [1.0, 0.0]], [[3.0], [np.nan]], lost=[False, True])
+    >>> state.training[1]
+    array([[3.]])
     """
     n_parameters, n_responses = state.points.shape[1], state.values.shape[1]
     points = checked_points(points, n_parameters)
@@ -217,6 +224,15 @@ def propose(
     ------
     UserError
         If the samples that held cannot be fitted or the criterion cannot choose.
+
+    Examples
+    --------
+    >>> from maglev.uncertainty.learning import taylor_batch
+    >>> from maglev.uncertainty.rbf import fit_rbf
+    >>> points = np.linspace(-2.0, 2.0, 5)[:, None]
+    >>> state = absorb(AdaptiveState.empty(1, 1), points, points**2)
+    >>> propose(state, fit_rbf, taylor_batch, [[0.1], [3.0]], 1).points
+    array([[0.1]])
     """
     candidates = checked_points(candidates, state.points.shape[1])
     surrogate = fit(*state.training)
@@ -247,6 +263,14 @@ def decision(state: AdaptiveState, *, threshold: float, n_rounds: int, n_largest
     ------
     UserError
         If a setting is not positive.
+
+    Examples
+    --------
+    >>> state = absorb(AdaptiveState.empty(1, 1), [[0.0], [1.0]], [[0.0], [1.0]])
+    >>> decision(state, threshold=0.01, n_rounds=3, n_largest=100)
+    'go_on'
+    >>> decision(state, threshold=0.01, n_rounds=3, n_largest=2)
+    'largest_number_of_runs'
     """
     if not (threshold > 0.0 and n_rounds >= 1 and n_largest >= 1):
         raise UserError(

@@ -47,6 +47,15 @@ class Marginals:
     UserError
         If there is no input, if one is not a frozen continuous univariate distribution, if a mean
         or deviation is not finite or a deviation not positive, or if inputs are correlated.
+
+    Examples
+    --------
+    >>> from scipy.stats import norm
+    >>> inputs = Marginals([norm(10.0, 2.0), norm(5.0, 1.0)])
+    >>> inputs.to_standard([[12.0, 4.0]])
+    array([[ 1., -1.]])
+    >>> inputs.from_unit_cube([[0.5, 0.5]])
+    array([[10.,  5.]])
     """
 
     distributions: Sequence[rv_frozen]

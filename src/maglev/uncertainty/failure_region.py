@@ -144,6 +144,15 @@ def fit_failure_region(
     References
     ----------
     Murray, Adams, MacKay, Elliptical slice sampling, Proc. AISTATS (2010), fig. 2.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> points = rng.normal(size=(60, 2))
+    >>> region = fit_failure_region(points, points[:, 0] < -1.0, rng)
+    >>> probability = region.lost_probability([[-3.0, 0.0], [2.0, 0.0]])
+    >>> bool(probability[0] > 0.9 and probability[1] < 0.1)
+    True
     """
     points = checked_points(points)
     lost = np.asarray(lost)
@@ -235,6 +244,16 @@ def learnt_loss(
     References
     ----------
     Clopper, Pearson, Biometrika 26 (1934) 404-413.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> points, population = rng.normal(size=(60, 2)), rng.normal(size=(1000, 2))
+    >>> loss = learnt_loss(points, np.zeros(60, dtype=bool), population, rng)
+    >>> loss.probability
+    0.0
+    >>> round(loss.upper, 3)  # none of 60 lost
+    0.06
     """
     lost = np.asarray(lost)
     if not 0.0 < confidence < 1.0:
@@ -290,6 +309,14 @@ def border_batch(
     References
     ----------
     docs/theory/adaptive_sampling.md, sec. 5.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> points = rng.normal(size=(60, 2))
+    >>> region = fit_failure_region(points, points[:, 0] < -1.0, rng)
+    >>> border_batch(region, points, [[2.0, 0.0], [-1.0, 0.0]], 1)
+    array([1])
     """
     occupied = checked_points(occupied, region.n_parameters)
     candidates = checked_points(candidates, region.n_parameters)

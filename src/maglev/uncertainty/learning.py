@@ -67,6 +67,11 @@ def taylor_scores(
     References
     ----------
     Mo et al., Water Resour. Res. 53 (2017) 10802–10823; docs/theory/adaptive_sampling.md, sec. 1.
+
+    Examples
+    --------
+    >>> taylor_scores([0.5, 1.0], [[0.2], [0.1]], diameter=2.0)
+    array([1.25, 1.25])
     """
     distance, remainder = np.asarray(distance, float), np.asarray(remainder, float)
     _check_aggregate(aggregate)
@@ -108,6 +113,14 @@ def taylor_remainder(surrogate: Surrogate, candidates: npt.ArrayLike) -> FloatAr
     References
     ----------
     Mo et al., Water Resour. Res. 53 (2017) 10802–10823; docs/theory/adaptive_sampling.md, sec. 1.
+
+    Examples
+    --------
+    >>> from maglev.uncertainty.rbf import fit_rbf
+    >>> points = np.array([[0.0], [1.0], [2.0]])
+    >>> line = fit_rbf(points, 3.0 * points)  # its own tangent everywhere
+    >>> bool(np.abs(taylor_remainder(line, [[0.5]])).max() < 1e-9)
+    True
     """
     candidates = checked_points(candidates, surrogate.points.shape[1])
     nearest = cKDTree(surrogate.points).query(candidates)[1]
@@ -162,6 +175,14 @@ def taylor_batch(
     References
     ----------
     Mo et al., Water Resour. Res. 53 (2017) 10802–10823; docs/theory/adaptive_sampling.md, sec. 1.
+
+    Examples
+    --------
+    >>> from maglev.uncertainty.rbf import fit_rbf
+    >>> points = np.array([[0.0], [1.0], [2.0]])
+    >>> curve = fit_rbf(points, points**2)
+    >>> taylor_batch(curve, points, [[0.1], [3.0]], 1)
+    array([0])
     """
     occupied, candidates, held, distance = _checked(
         surrogate, occupied, candidates, n_new, held_probability
@@ -208,6 +229,12 @@ def predicted_limits(
     ------
     UserError
         If a probability does not lie between 0 and 1.
+
+    Examples
+    --------
+    >>> predicted_limits(np.arange(100.0)[:, None], [0.1, 0.05])
+    array([[89.],
+           [94.]])
     """
     values = np.asarray(values, float)
     n = values.shape[0]
@@ -277,6 +304,16 @@ def tail_batch(
     ----------
     Picheny et al., J. Mech. Des. 132 (2010) 071008 (targeted mean square error); Chevalier et al.,
     Technometrics 56 (2014) 455–465 (batches); docs/theory/adaptive_sampling.md.
+
+    Examples
+    --------
+    >>> from maglev.uncertainty.kriging import conditioned_kriging
+    >>> points = np.linspace(-2.0, 2.0, 5)[:, None]
+    >>> process = conditioned_kriging(points, points, length=[[1.0]], amplitude=[1.0])
+    >>> candidates = np.linspace(-3.0, 3.0, 61)[:, None]
+    >>> (chosen,) = tail_batch(process, points, candidates, 1, exceedances=(0.05,))
+    >>> bool(candidates[chosen, 0] > 2.0)  # the limit is at 2.7
+    True
     """
     if not hasattr(surrogate, "covariance"):
         raise UserError(

@@ -96,6 +96,14 @@ def gf_points(
     References
     ----------
     Chen, Yang, Li, Structural Safety 59 (2016) 20-31; docs/theory/point_sets.md.
+
+    Examples
+    --------
+    >>> from scipy.stats import norm
+    >>> inputs = Marginals([norm(10.0, 2.0), norm(5.0, 1.0)])
+    >>> found = gf_points(inputs, 32, np.random.default_rng(1), counting=2**12)
+    >>> print(f"{found.probability.sum():.6f}")
+    1.000000
     """
     _check_size(n)
     equal = np.full(n, 1.0 / n)
@@ -140,6 +148,13 @@ def sobol_points(marginals: Marginals, n: int, rng: np.random.Generator) -> Poin
     References
     ----------
     Owen, J. Complexity 14 (1998) 466-489; scipy.stats.qmc.Sobol.
+
+    Examples
+    --------
+    >>> from scipy.stats import norm
+    >>> found = sobol_points(Marginals([norm(10.0, 2.0)]), 4, np.random.default_rng(1))
+    >>> found.probability
+    array([0.25, 0.25, 0.25, 0.25])
     """
     _check_size(n)
     return _equal_weights(_sobol_unit(marginals.n, n, rng), marginals)
@@ -175,6 +190,14 @@ def rearranged(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Margina
     ----------
     Chen, Yang, Li, Structural Safety 59 (2016) 20-31, the first and second
     rearrangement; docs/theory/point_sets.md, eqs. (3) and (5).
+
+    Examples
+    --------
+    >>> from scipy.stats import norm
+    >>> inputs = Marginals([norm()])
+    >>> rearranged([[3.0], [-2.0]], [0.5, 0.5], inputs).round(4)  # to the quartiles
+    array([[ 0.6745],
+           [-0.6745]])
     """
     points, weights = _checked_points(points, weights, marginals)
     order = np.argsort(points, axis=0)
@@ -235,6 +258,14 @@ def voronoi_probability(
     References
     ----------
     Chen, Yang, Li, Structural Safety 59 (2016) 20-31; docs/theory/point_sets.md, eq. (4).
+
+    Examples
+    --------
+    >>> from scipy.stats import norm
+    >>> inputs, rng = Marginals([norm()]), np.random.default_rng(1)
+    >>> probability, _, _ = voronoi_probability([[-1.0], [1.0]], inputs, rng, counting=2**12)
+    >>> probability.round(2)
+    array([0.5, 0.5])
     """
     standard = marginals.to_standard(points)
     n = len(standard)
@@ -297,6 +328,12 @@ def gf_discrepancy(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Mar
     References
     ----------
     Chen, Yang, Li, Structural Safety 59 (2016) 20-31; docs/theory/point_sets.md, eq. (1).
+
+    Examples
+    --------
+    >>> from scipy.stats import norm
+    >>> gf_discrepancy([[0.0]], [1.0], Marginals([norm()]))
+    0.5
     """
     points, weights = _checked_points(points, weights, marginals)
     exact = marginals.to_unit_cube(points)

@@ -229,6 +229,14 @@ def fit_rbf(
     References
     ----------
     Buhmann, Radial Basis Functions (2003), ch. 2 and 5; Rippa, Adv. Comput. Math. 11 (1999).
+
+    Examples
+    --------
+    >>> points = np.array([[0.0], [1.0], [2.0], [3.0]])
+    >>> surrogate = fit_rbf(points, points**2)
+    >>> surrogate.predict([[2.0], [2.5]]).round(2)  # exact at a training point
+    array([[4.  ],
+           [6.35]])
     """
     points, values = checked_training(points, values)
     n_parameters = points.shape[1]
@@ -277,6 +285,14 @@ def fit_scaled_rbf(
     ------
     UserError
         As ``fit_rbf``, or if there are too few points to leave one out.
+
+    Examples
+    --------
+    >>> points = np.random.default_rng(0).normal(size=(30, 2))
+    >>> surrogate = fit_scaled_rbf(points, np.sin(2.0 * points[:, :1]))
+    >>> short, long = surrogate.length[0]
+    >>> bool(short < long)  # the second input changes nothing
+    True
     """
     points, values = checked_training(points, values)
     isotropic = fit_rbf(points, values, basis=basis)

@@ -120,6 +120,11 @@ def exceedance(
     References
     ----------
     docs/theory/reliability.md, eq. (2).
+
+    Examples
+    --------
+    >>> exceedance([1.5, 3.0], [1.0, 2.0, 3.0, 4.0])
+    array([0.75, 0.25])
     """
     values, probability = weighted_sample(values, probability)
     check_lost_probability(lost_probability)
@@ -166,6 +171,16 @@ def sample_limits(
     References
     ----------
     David, Nagaraja, Order Statistics (2003), sec. 7.1; docs/theory/reliability.md, eqs. (4), (5).
+
+    Examples
+    --------
+    >>> limits = sample_limits(np.arange(1000.0), [0.1, 0.001])
+    >>> limits.limit
+    array([899.,  nan])
+    >>> limits.status
+    ('given', 'too_few_exceedances')
+    >>> limits.half_width[0].item()
+    19.0
     """
     values, _ = weighted_sample(values)
     levels = _checked_levels(failure_probability)
@@ -251,6 +266,16 @@ def surrogate_limits(
     Barber et al., Ann. Stat. 49 (2021) 486-507 (rank of a leave-one-out residual); Rasmussen,
     Williams, Gaussian Processes for Machine Learning (2006), eq. 2.26; docs/theory/reliability.md,
     eqs. (6) to (8).
+
+    Examples
+    --------
+    >>> predictions = np.arange(1000.0)
+    >>> limits = surrogate_limits(predictions, [0.1], error_range=(-5.0, 5.0))
+    >>> limits.limit
+    array([899.])
+    >>> lower, upper = limits.interval
+    >>> float(upper[0] - lower[0]) > 10.0
+    True
     """
     predictions, probability = weighted_sample(predictions)
     levels = _checked_levels(failure_probability)
@@ -351,6 +376,14 @@ def clustered_limits(
     ----------
     Woodruff, J. Am. Stat. Assoc. 47 (1952) 635-646; Korn, Graubard, Surv. Methodol. 24 (1998)
     193-201; docs/theory/reliability.md, eqs. (16) and (17).
+
+    Examples
+    --------
+    >>> gains = np.linspace(0.0, 1.0, 100)
+    >>> tracks = np.linspace(0.0, 2.0, 30)[:, None]
+    >>> limits = clustered_limits(gains + tracks, [0.2])
+    >>> limits.limit.round(2)
+    array([2.12])
     """
     values = np.asarray(values, dtype=float)
     levels = _checked_levels(failure_probability)
@@ -433,6 +466,14 @@ def error_range_near(
     References
     ----------
     Barber et al., Ann. Stat. 49 (2021) 486-507; docs/theory/reliability.md, eqs. (7) and (9).
+
+    Examples
+    --------
+    >>> values = np.linspace(0.0, 1.0, 200)
+    >>> residuals = 0.01 * np.sin(1e3 * values)
+    >>> low, high = error_range_near(0.5, values, residuals)
+    >>> bool(-0.01 <= low[0] < high[0] <= 0.01)
+    True
     """
     at = _checked_places(at)
     values, residuals = np.asarray(values, dtype=float), np.asarray(residuals, dtype=float)
@@ -478,6 +519,12 @@ def binomial_interval(
     References
     ----------
     Clopper, Pearson, Biometrika 26 (1934) 404-413.
+
+    Examples
+    --------
+    >>> low, high = binomial_interval(3, 1000, 0.95)
+    >>> print(f"{low:.5f} {high:.5f}")
+    0.00062 0.00874
     """
     k = np.asarray(n_beyond, dtype=float)
     outside = 0.5 * (1.0 - confidence)

@@ -64,6 +64,12 @@ def deviation_interval(
     References
     ----------
     Bonett, Comput. Stat. Data Anal. 50 (2006) 775-782.
+
+    Examples
+    --------
+    >>> deviation, low, high = deviation_interval(np.arange(100.0))
+    >>> low < deviation < high
+    True
     """
     values, _ = weighted_sample(values)
     n = values.size
@@ -105,6 +111,11 @@ def weighted_sample(
     UserError
         If there is no value, a shape is wrong, a value is not finite, a probability is negative
         or they do not sum to one.
+
+    Examples
+    --------
+    >>> weighted_sample([3.0, 1.0])
+    (array([3., 1.]), array([0.5, 0.5]))
     """
     values = np.asarray(values, dtype=float)
     if values.ndim != 1 or values.size == 0:
@@ -139,6 +150,11 @@ def checked_probability(probability: npt.ArrayLike, n: int) -> FloatArray:
     ------
     UserError
         If their number is not ``n``, one is negative or NaN, or they do not sum to one.
+
+    Examples
+    --------
+    >>> checked_probability([0.25, 0.75], 2)
+    array([0.25, 0.75])
     """
     probability = np.asarray(probability, dtype=float)
     if probability.shape != (n,):
@@ -169,6 +185,10 @@ def check_lost_probability(lost_probability: float) -> None:
     ------
     UserError
         If it lies outside [0, 1).
+
+    Examples
+    --------
+    >>> check_lost_probability(0.2)  # at least something is held
     """
     if not 0.0 <= lost_probability < 1.0:
         raise UserError(f"lost probability must lie in [0, 1), got {lost_probability}")
@@ -202,6 +222,14 @@ def held_part(
     References
     ----------
     docs/theory/reliability.md, eq. (2).
+
+    Examples
+    --------
+    >>> part = held_part([1.0, np.nan, 3.0, 2.0], lost=[False, True, False, False])
+    >>> part.values
+    array([1., 3., 2.])
+    >>> part.lost_probability
+    0.25
     """
     values, lost = np.asarray(values, dtype=float), np.asarray(lost)
     if values.ndim != 1 or lost.shape != values.shape or lost.dtype != np.bool_:
@@ -242,6 +270,13 @@ def effective_size(probability: npt.ArrayLike) -> float:
     References
     ----------
     Kish, Survey Sampling (1965), sec. 11.7.
+
+    Examples
+    --------
+    >>> effective_size([0.25, 0.25, 0.25, 0.25])
+    4.0
+    >>> round(effective_size([0.7, 0.1, 0.1, 0.1]), 2)
+    1.92
     """
     return float(1.0 / np.sum(np.square(np.asarray(probability, dtype=float))))
 
@@ -262,6 +297,11 @@ def weight_beyond(values: FloatArray, weight: FloatArray) -> tuple[FloatArray, F
         The values.
     beyond : (sample + 1,)
         Weight beyond the first k, for k from none to all.
+
+    Examples
+    --------
+    >>> weight_beyond(np.array([3.0, 1.0]), np.array([0.25, 0.75]))
+    (array([1., 3.]), array([1.  , 0.25, 0.  ]))
     """
     order = np.argsort(values, kind="stable")
     return values[order], np.append(np.cumsum(weight[order][::-1])[::-1], 0.0)
@@ -287,6 +327,11 @@ def weighted_quantile(
     -------
     quantile : (level,)
         Values of the sample.
+
+    Examples
+    --------
+    >>> weighted_quantile([1.0, 2.0, 3.0, 4.0], [0.25] * 4, [0.5, 0.25])
+    array([2., 3.])
     """
     ordered, left = weight_beyond(np.asarray(values, float), np.asarray(weight, float))
     # left[k + 1] lies beyond the k-th smallest value and does not grow with k

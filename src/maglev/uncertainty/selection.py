@@ -113,6 +113,12 @@ def fit_selected(points: npt.ArrayLike, values: npt.ArrayLike, choice: str) -> S
     References
     ----------
     docs/theory/surrogates.md, sec. 5.
+
+    Examples
+    --------
+    >>> points = np.linspace(-2.0, 2.0, 9)[:, None]
+    >>> fit_selected(points, np.sin(points), "rbf").kinds
+    ('rbf',)
     """
     if choice not in CHOICES:
         raise UserError(f"surrogate must be one of {', '.join(CHOICES)}, got '{choice}'")
@@ -162,6 +168,14 @@ def rebuilt(
     ------
     UserError
         If a kind is unknown, shapes disagree or the training data cannot be used.
+
+    Examples
+    --------
+    >>> points = np.linspace(-2.0, 2.0, 9)[:, None]
+    >>> first = fit_selected(points, np.sin(points), "rbf")
+    >>> again = rebuilt(first.points, first.values, first.kinds, first.length, first.amplitude)
+    >>> bool((again.predict([[0.1]]) == first.predict([[0.1]])).all())
+    True
     """
     points, values = checked_training(points, values)
     length, amplitude = np.array(length, dtype=float), np.array(amplitude, dtype=float)

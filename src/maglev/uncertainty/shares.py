@@ -70,6 +70,15 @@ def pick_freeze_shares(
     ----------
     Janon et al., ESAIM Probab. Stat. 18 (2014) 342-364; Efron, Tibshirani, An Introduction to the
     Bootstrap (1993), ch. 13; docs/theory/reliability.md, eq. (13).
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> a, b, other_a, other_b = rng.normal(size=(4, 1000))
+    >>> found = pick_freeze_shares(2 * a + b, 2 * a + other_b, 2 * other_a + b, rng)
+    >>> share, low, high = found.first
+    >>> bool(low < 0.8 < high)  # 4 of 5 parts
+    True
     """
     runs = np.array([np.asarray(one, dtype=float) for one in (values, same_first, same_second)])
     if runs.ndim != 2 or runs.shape[1] < 2:
@@ -144,6 +153,13 @@ def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
     ----------
     Searle, Casella, McCulloch, Variance Components (1992), sec. 4.3; Arvesen, Schmitz, Biometrics
     26 (1970) 677-686, for the jackknife; docs/theory/reliability.md, eqs. (14) and (15).
+
+    Examples
+    --------
+    >>> a, b = np.random.default_rng(0).normal(size=(2, 40))
+    >>> found = crossed_shares(a + b[:, None])
+    >>> bool(abs(found.interaction[0]) < 1e-9)  # a sum
+    True
     """
     runs = np.asarray(values, dtype=float)
     if runs.ndim != 2 or runs.shape[0] < 3 or runs.shape[1] < 2:
@@ -217,6 +233,12 @@ def first_order(points: npt.ArrayLike, values: npt.ArrayLike) -> FloatArray:
     References
     ----------
     Plischke, Reliab. Eng. Syst. Saf. 95 (2010) 354-360, the correlation ratio.
+
+    Examples
+    --------
+    >>> points = np.random.default_rng(0).normal(size=(10_000, 2))
+    >>> first_order(points, points @ [[2.0], [1.0]]).round(1)
+    array([[0.8, 0.2]])
     """
     points, values = np.asarray(points, dtype=float), np.asarray(values, dtype=float)
     size = points.shape[0] // N_BINS

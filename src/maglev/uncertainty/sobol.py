@@ -39,6 +39,17 @@ def sobol_indices(
     References
     ----------
     Saltelli et al., Comput. Phys. Commun. 181 (2010) 259-270; scipy.stats.sobol_indices.
+
+    Examples
+    --------
+    >>> from maglev.uncertainty.rbf import fit_rbf
+    >>> points = np.random.default_rng(0).normal(size=(12, 2))
+    >>> plane = fit_rbf(points, points @ [[2.0], [1.0]])
+    >>> (first, _, _), (total, _, _) = sobol_indices(plane, np.random.default_rng(1), 0.95)
+    >>> first.round(2)
+    array([[0.79, 0.2 ]])
+    >>> total.round(2)
+    array([[0.8 , 0.21]])
     """
     n_parameters, n_responses = surrogate.points.shape[1], surrogate.values.shape[1]
     lowest, highest = surrogate.values.min(axis=0), surrogate.values.max(axis=0)

@@ -66,6 +66,11 @@ def checked_points(points: npt.ArrayLike, n_parameters: int | None = None) -> Fl
     ------
     UserError
         If the shape is another one or a coordinate is not finite.
+
+    Examples
+    --------
+    >>> checked_points([[0.0, 1.0]], 2)
+    array([[0., 1.]])
     """
     array = np.ascontiguousarray(points, dtype=np.float64)
     expected = "any" if n_parameters is None else n_parameters
@@ -105,6 +110,12 @@ def checked_training(points: npt.ArrayLike, values: npt.ArrayLike) -> tuple[Floa
     UserError
         If shapes disagree, something is not finite, two points coincide, a response is constant,
         or there are fewer points than a linear tail needs.
+
+    Examples
+    --------
+    >>> points, values = checked_training([[0.0], [1.0], [2.0]], [[5.0], [6.0], [8.0]])
+    >>> values.shape
+    (3, 1)
     """
     points = checked_points(points)
     values = np.array(values, dtype=np.float64)
@@ -167,6 +178,13 @@ def relative_error(surrogate: Surrogate) -> FloatArray:
     ------
     UserError
         If there are too few points to leave one out.
+
+    Examples
+    --------
+    >>> from maglev.uncertainty.rbf import fit_rbf
+    >>> points = np.random.default_rng(0).normal(size=(12, 2))
+    >>> bool(relative_error(fit_rbf(points, points)).max() < 1e-9)  # a plane is met
+    True
     """
     residuals = surrogate.leave_one_out()
     return np.sqrt(np.mean(residuals**2, axis=0)) / np.std(surrogate.values, axis=0)
@@ -189,6 +207,15 @@ def best_by_leave_one_out(surrogates: Mapping[str, Surrogate]) -> tuple[str, ...
     ------
     UserError
         If there is nothing to choose from or the training data differ.
+
+    Examples
+    --------
+    >>> from maglev.uncertainty.rbf import fit_rbf
+    >>> points = np.linspace(-2.0, 2.0, 9)[:, None]
+    >>> values = np.sin(points)
+    >>> fits = {kind: fit_rbf(points, values, basis=kind) for kind in ("cubic", "thin_plate")}
+    >>> best_by_leave_one_out(fits)
+    ('cubic',)
     """
     names = list(surrogates)
     if not names:
