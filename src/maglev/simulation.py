@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -197,10 +198,10 @@ def _checked_seeds(track_seeds: npt.ArrayLike, n_samples: int, solver: str) -> l
 
 
 def _track_file_hash(config: Config) -> str:
-    """Hash of the measured irregularity; empty where there is none."""
+    """Hash of the measured irregularity; empty without one, or where reading it will fail."""
     irregularity = config.irregularity
     name = irregularity.profile_file if irregularity.enabled else None
-    return file_hash(name) if name else ""
+    return file_hash(name) if name and Path(name).is_file() else ""
 
 
 @lru_cache(maxsize=2)
