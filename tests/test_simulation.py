@@ -155,7 +155,7 @@ def test_real_cars_press_real_spans_down_by_some_millimetre_and_a_half(n_cars, n
     )
     passages = simulate(config, MEAN[None])
     assert passages["status"] == 0
-    assert 1.4e-3 < passages["girder_displacement_z"] < 1.7e-3
+    assert 1.4e-3 < passages["girder_displacement_z"] < 1.8e-3
 
 
 def test_a_train_three_times_as_long_as_the_guideway_passes():
