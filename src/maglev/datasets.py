@@ -1192,7 +1192,7 @@ def provenance(
 
 
 def carried(dataset: xr.Dataset) -> dict[str, Any]:
-    """What a file made of another says of its passages too: their steps and their track."""
+    """Attributes that a file takes over from its sources: steps and track of the passages."""
     kept = ("time_step", "n_steps", "track")
     return {name: dataset.attrs[name] for name in kept if name in dataset.attrs}
 

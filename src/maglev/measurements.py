@@ -49,7 +49,7 @@ SAME_SPAN = 1e-3
 
 
 def measured_here(config: Config) -> Measurements | None:
-    """What was measured on the bridge that the configuration describes; None if nothing was.
+    """Measurements on the guideway of the configuration; None if there are none.
 
     Raises
     ------

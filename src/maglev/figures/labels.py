@@ -19,7 +19,7 @@ from maglev.vocabulary import GAINS, METHODS, RESPONSES
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """How a response is shown.
+    """Name, symbol, scale and unit of a response in figures.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ class Shown:
 
     @property
     def axis(self) -> str:
-        """Label of an axis along which the response is shown."""
+        """Label of an axis of the response."""
         return f"{self.symbol} [{self.unit}]"
 
     @property
     def density_axis(self) -> str:
-        """Label of an axis along which its density is shown."""
+        """Label of an axis of its density."""
         return f"density [{'1/mm' if self.unit == 'mm' else 's²/m'}]"
 
 
@@ -92,7 +92,7 @@ METHOD_MARKER = {"mcm": "s", "osm": "s", "asm_paper": "^", "asm": "o"}
 
 
 def method_of(data: xr.Dataset) -> str:
-    """Name of the method that a file belongs to.
+    """Name of the method of a file.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def method_of(data: xr.Dataset) -> str:
 
 
 def case_name(data: xr.Dataset) -> str:
-    """Name of the case that a file belongs to."""
+    """Name of the case of a file."""
     return str(data.attrs.get("case", ""))
 
 
@@ -145,7 +145,7 @@ def gains_of(data: xr.Dataset) -> list[int]:
 
 
 def case_style(parameters: list[int]) -> tuple[str, style.Look]:
-    """Words and line for a case by its random gains."""
+    """Name and line style of a case, from its random gains."""
     if len(parameters) == 1:
         number = parameters[0]
         return f"{GAIN[number]} alone", {"color": GAIN_COLOUR[number], "ls": _DASHES[number]}
@@ -166,11 +166,11 @@ _GROUP_DASHES: dict[str, LineStyleType] = {"pole": "-", "ends": "--", "half": "-
 
 
 def control_style(design: xr.Dataset) -> tuple[str, style.Look]:
-    """Words and line for a case by who shares a circuit, and how late its current comes.
+    """Name and line style of a case, from the sharing of its circuits and their lag.
 
     Raises
     ------
-    ValueError
+    UserError
         If the file does not say how it was configured.
     """
     try:
@@ -182,7 +182,7 @@ def control_style(design: xr.Dataset) -> tuple[str, style.Look]:
             for one in kinds
         ]
     except (KeyError, TypeError):
-        raise ValueError("the file must say how its circuits were configured") from None
+        raise UserError("the file must say how its circuits were configured") from None
     late = [_in_ms(", ".join(one)) for one in times]
     if groups[0] == groups[1] and late[0] == late[1]:
         words = ", ".join(filter(None, (_GROUP[groups[0]], late[0])))
@@ -202,7 +202,7 @@ def _in_ms(words: str) -> str:
 
 
 def response_panels(height: float) -> tuple[Figure, list[tuple[int, Axes, Shown]]]:
-    """A page of six titled panels, one a response: its number, its panel, how it is shown.
+    """A figure of six titled panels; for each response its number, its panel and its labels.
 
     Parameters
     ----------
@@ -216,12 +216,12 @@ def response_panels(height: float) -> tuple[Figure, list[tuple[int, Axes, Shown]
 
 
 def of_runs(name: str, n_runs: SupportsInt, lost_probability: SupportsFloat) -> str:
-    """Words of a legend for a curve: what it is, from how many runs, and how many are lost."""
+    """Legend entry of a curve: name, number of runs, share of lost runs."""
     return f"{name}, {int(n_runs)} runs, lost {percent(float(lost_probability))}"
 
 
 def of_settings(design: xr.Dataset) -> str:
-    """Words of a legend's title for which gains are random, and on which guideway."""
+    """Title of a legend: coefficient of variation and number of spans."""
     variation, n_spans = settings(design)
     return f"random ({n_spans} spans, coefficient of variation {variation:.2f})"
 

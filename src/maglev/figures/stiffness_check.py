@@ -12,7 +12,7 @@ _STIFFER = (0.8, 1.2, 1.5, 2.0)
 
 
 def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
-    """Draw the hyperbola of mass and load, model and measurement, and what would join them.
+    """Draw deflection over frequency: model, measurement, and changes that would reconcile them.
 
     Parameters
     ----------

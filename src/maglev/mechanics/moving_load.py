@@ -69,7 +69,7 @@ DEFLECTION_BY_FREQUENCY = 5 * math.pi**2 / 1536
 def deflection_at_frequency(
     frequency: npt.ArrayLike, load: float, mass_per_length: float
 ) -> FloatArray:
-    """Static midspan deflection of the simply supported beam that has a first frequency.
+    """Static midspan deflection of a simply supported beam from its first natural frequency.
 
     Parameters
     ----------
@@ -84,6 +84,14 @@ def deflection_at_frequency(
     -------
     deflection
         [m], one for each frequency.
+
+    Examples
+    --------
+    >>> span = {"length": 24.8, "bending_stiffness": 2.5e10, "mass_per_length": 4000.0}
+    >>> beam = Beam(**span, damping_ratio=0.02)
+    >>> found = deflection_at_frequency(beam.frequency(), 2e4, beam.mass_per_length)
+    >>> bool(np.isclose(found, beam.static_deflection(2e4)))
+    True
     """
     frequency = np.asarray(frequency, dtype=float)
     return DEFLECTION_BY_FREQUENCY * load / mass_per_length / frequency**2

@@ -1,4 +1,4 @@
-"""What the kernels read: train, magnets, circuits, places and guideway as arrays."""
+"""Arrays for the kernels: train, magnets, circuits, places and guideway."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def places(
     guideway: guideway_model.GuidewayModel,
     reduced: ReducedGuideway,
 ) -> tuple[Places, Ground]:
-    """Tabulate what the poles meet after whole numbers of steps; no track yet."""
+    """Tabulate rails and sag under the poles after whole numbers of steps; no track yet."""
     way = course(config)
     begins = (rows.x[:, None] + rows.offset + way.start) / way.advance
     whole = np.floor(begins + 1e-6)
@@ -221,7 +221,7 @@ def _magnet(config: Config, rows: MagnetRows) -> Magnet:
 def tracks(
     config: Config, grounds: tuple[Ground, Ground], profiles: Sequence[Profile]
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """For each kind of pole what it meets at its places, and its rate (place, side, profile)."""
+    """Irregularity at the places of each kind of pole, and its rate (place, side, profile)."""
     met = []
     for ground, rows in zip(grounds, (slice(0, 2), slice(2, 4)), strict=True):
         rail, ramp = np.empty((2, *ground.sag.shape, len(profiles)))
@@ -385,9 +385,9 @@ def _stretches(
     damping_start: IntArray,
     taken_start: IntArray,
 ) -> Stretches:
-    """What is stepped in each stretch.
+    """Active coordinates of each stretch.
 
-    Also where its rows begin and end, whole or short, of damping and of what modes take along.
+    With the ends of their rows, whole or short, of damping and of modes carried by pier tops.
     """
     n = reduced.n_modes
     dt = course(config).time_step
@@ -459,7 +459,7 @@ def run(config: Config, record_every: int) -> Run:
 def empty_outcome(
     train: train_model.TrainModel, kinds: tuple[MagnetRows, MagnetRows], run: Run
 ) -> Outcome:
-    """Room for what a row of samples leaves behind, as for a train at rest."""
+    """Empty results of a row of samples, as for a train at rest."""
     n_cars = train.parameters.n_cars
     table = train.magnets
     n_magnets = table.x.size
