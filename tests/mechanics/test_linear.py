@@ -63,7 +63,7 @@ class Row:
                 masses.append((8, [rod]))
                 links += [
                     (body(end)[2] - frame(end)[2], 2e5, 5e3),
-                    (frame(pivot)[1] - 0.5 * rod - body(end)[1], 2e5, 0.0),
+                    (frame(pivot)[1] - 0.5 * rod - body(end)[1], 2e5, 300.0),
                     (rod, hangs, 0.0),
                     (rod - self.unit(f"{name}.phi{k % 2}"), 0.0, 10.0),
                     (frame(pivot)[1] - body(pivot)[1], 0.0, 3e3),
