@@ -22,6 +22,9 @@ from maglev.mechanics.irregularity import Profile, profile
 from maglev.mechanics.responses import GIRDER_RESPONSES, Passages, checked_gains
 from maglev.parameters import Config
 
+KEPT_TRACKS = 64
+"""Irregularities that are kept while samples run, one for each seed [-]; assumed: 10 MB."""
+
 HISTORY_INTERVAL = 1e-3
 """Time between recorded rows of the histories, at most [s]; assumed: ten points in a period of the
 highest frequency in the band of the responses."""
@@ -109,7 +112,7 @@ def simulate(
         passages = integrate.integrate(
             _system(config, _track_file_hash(config)),
             gains,
-            profile_of=None if seeds is None else lambda k: track(config, seeds[k]),
+            profile_of=None if seeds is None else _tracks_of(config, seeds),
             record_every=every,
             n_threads=n_threads,
             on_progress=on_progress,
@@ -180,6 +183,12 @@ def track_words(config: Config, seeds: Sequence[int] | None = None) -> str:
     if seeds is not None:
         return "a track of its own for every passage"
     return f"track of seed {config.seed}"
+
+
+def _tracks_of(config: Config, seeds: list[int]) -> Callable[[int], Profile]:
+    """The irregularity of a sample by its number; samples of one seed share it."""
+    of_seed = lru_cache(maxsize=KEPT_TRACKS)(lambda seed: track(config, seed))
+    return lambda sample: of_seed(seeds[sample])
 
 
 def _checked_seeds(track_seeds: npt.ArrayLike, n_samples: int, solver: str) -> list[int]:

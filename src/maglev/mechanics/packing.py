@@ -223,12 +223,15 @@ def tracks(
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Irregularity at the places of each kind of pole, and its rate (place, side, profile)."""
     met = []
+    one_each = list({id(profile): profile for profile in profiles}.values())
+    column = [next(k for k, one in enumerate(one_each) if one is profile) for profile in profiles]
     for ground, rows in zip(grounds, (slice(0, 2), slice(2, 4)), strict=True):
-        rail, ramp = np.empty((2, *ground.sag.shape, len(profiles)))
-        for k, profile in enumerate(profiles):
+        rail, ramp = np.empty((2, *ground.sag.shape, len(one_each)))
+        for k, profile in enumerate(one_each):
             value, slope = mean_displacement(profile, ground.x, ground.pole_length)
             rail[..., k] = value[rows].T + ground.sag
             ramp[..., k] = (slope[rows].T + ground.sag_slope) * config.passage.speed
+        rail, ramp = (np.ascontiguousarray(one[..., column]) for one in (rail, ramp))
         met.append((rail, ramp))
     return met
 
