@@ -77,7 +77,7 @@ from maglev.simulation import _system
 mark("imports")
 config = maglev.load_config()
 gains = np.array([config.gains.as_row])
-system = _system(config)
+system = _system(config, "")
 mark("configuration, matrices and tables")
 integrate.integrate(system, gains)
 mark("first passage")
@@ -675,7 +675,7 @@ def batches(config: Config, counts: tuple[int, ...]) -> list[Row]:
     rows = []
     for count in counts:
         gains, begun = gains_of(config, count), time.process_time()
-        passages = integrate.integrate(_system(config), gains)
+        passages = integrate.integrate(_system(config, ""), gains)
         rows.append(Row(count, time.process_time() - begun, course(config).n_steps))
         if passages.status.any():
             raise RuntimeError(f"{np.count_nonzero(passages.status)} samples lost levitation")
@@ -779,7 +779,7 @@ def measure(sizes: Sizes) -> Results:
     results.startup = start_up(2)
     tell(f"  {beyond_passage(results.startup).process:.2f} s beyond the passages")
     tell("production solver, one full row")
-    system = _system(config)
+    system = _system(config, "")
     integrate.integrate(system, gains_of(config, 1))
     results.production = timed(lambda: integrate.integrate(system, gains_of(config, LANES)), 3)
     tell(f"  {results.per_passage:.4f} s a passage")
