@@ -522,10 +522,10 @@ def step_time(config: Config, seconds: float) -> tuple[float, int]:
     profile, gains = track(config), np.array([config.gains.as_row])
 
     def look(_signal: int, frame: object) -> None:
-        while frame is not None and frame.f_code is not reference.integrate.__code__:
+        while frame is not None and frame.f_code is not reference.passed.__code__:
             frame = frame.f_back
-        if frame is not None and "step" in frame.f_locals:
-            seen.append((time.process_time(), frame.f_locals["step"]))
+        if frame is not None and "number" in frame.f_locals:
+            seen.append((time.process_time(), frame.f_locals["number"]))
             if seen[-1][0] - seen[0][0] > seconds:
                 raise _Enough
 
