@@ -96,6 +96,15 @@ def _file_keys(model: type[Parameters], path: tuple[str, ...] = ()) -> Iterator[
             yield (*path, name)
 
 
+def _files_of_laws(mapping: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    """Yield the path of every key of a random quantity that can name a file."""
+    cases = mapping.get("cases")
+    for name, case in cases.items() if isinstance(cases, Mapping) else ():
+        random = case.get("random") if isinstance(case, Mapping) else None
+        for key in random if isinstance(random, Mapping) else ():
+            yield ("cases", name, "random", key, "file")
+
+
 def named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield the path of every key of the mapping that names a file, and the name.
 
@@ -104,7 +113,7 @@ def named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], s
     >>> list(named_files({"irregularity": {"profile_file": "track.csv"}}))
     [(('irregularity', 'profile_file'), 'track.csv')]
     """
-    for path in _file_keys(Config):
+    for path in (*_file_keys(Config), *_files_of_laws(mapping)):
         value: Any = mapping
         for part in path:
             value = value.get(part) if isinstance(value, Mapping) else None

@@ -10,11 +10,9 @@ from __future__ import annotations
 
 import math
 import re
-import tokenize
-from collections.abc import Mapping
-from functools import lru_cache
+from collections.abc import Callable, Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from pydantic import (
     BaseModel,
@@ -24,12 +22,12 @@ from pydantic import (
     field_validator,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
+from maglev import laws
 from maglev.errors import UserError
+from maglev.units import in_unit
 from maglev.vocabulary import GAIN_KEYS, GROUPS, Gain, Group, Method, Response, Surrogate
-
-if TYPE_CHECKING:
-    import pint
 
 GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
 
@@ -49,13 +47,6 @@ SOURCES = {
 
 CONFIDENCE = {"H": "high", "M": "medium", "L": "low"}
 """How far a value can be trusted."""
-
-
-@lru_cache(maxsize=1)
-def _units() -> pint.UnitRegistry:
-    import pint  # half a second, spared where every unit is an SI unit already
-
-    return pint.UnitRegistry()
 
 
 def quantity(
@@ -102,59 +93,12 @@ def quantity(
     if below is not None:
         bounds["lt"] = below
     if isinstance(default, str):
-        default = _in_unit(default, unit, "default")
+        default = in_unit(default, unit, "default")
     elif default is not None:
         default = float(default)
     return Field(
         default, description=meaning, json_schema_extra=extra, allow_inf_nan=False, **bounds
     )
-
-
-_QUANTITY = re.compile(
-    r"\s*(?P<number>[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?)\s*"
-    r"(?P<unit>(?![eE][-+]?\d)[^\W\d].*?)\s*"
-)
-_FACTORS = {
-    ("km/h", "m/s"): (1.0, 3.6),
-    ("mm", "m"): (1.0, 1000.0),
-    ("ms", "s"): (1.0, 1000.0),
-    ("kN", "N"): (1000.0, 1.0),
-}
-"""What a number in the first unit is multiplied with and divided by for the second."""
-
-
-def _unreadable() -> tuple[type[Exception], ...]:
-    """Exceptions of pint for an unreadable unit."""
-    import pint
-
-    python = (ArithmeticError, AssertionError, SyntaxError, TypeError, ValueError)
-    return (pint.errors.PintError, tokenize.TokenError, *python)
-
-
-def _in_unit(text: str, unit: str, key: str) -> float:
-    """Convert a text such as ``"430 km/h"`` to a number in ``unit``."""
-    match = _QUANTITY.fullmatch(text)
-    if match is None:
-        raise ValueError(
-            f"{key} must be a number with a unit of {unit}, such as '1.5 {unit}', got {text!r}"
-        )
-    number = float(match["number"])
-    if match["unit"] == unit:
-        return number
-    if (match["unit"], unit) in _FACTORS:
-        times, over = _FACTORS[match["unit"], unit]
-        return number * times / over
-    try:
-        value = _units().Quantity(number, match["unit"])
-    except _unreadable() as error:
-        raise ValueError(
-            f"{key} must be a number with a unit of {unit}, got {text!r}, whose unit is not known"
-        ) from error
-    if not value.is_compatible_with(unit):
-        raise ValueError(
-            f"{key} must be given in {unit} or a unit that converts to it, got {text!r}"
-        )
-    return float(value.to(unit).magnitude)
 
 
 class Parameters(BaseModel):
@@ -177,12 +121,22 @@ class Parameters(BaseModel):
             if isinstance(value, bool):
                 raise ValueError(f"{name} must be a number, got {value}")
             if unit and isinstance(value, str):
-                converted[name] = _in_unit(value, unit, name)
+                converted[name] = in_unit(value, unit, name)
             elif unit and isinstance(value, int | float):
                 raise ValueError(f"{name} must carry its unit, such as '{value} {unit}'")
             elif unit:
                 raise ValueError(f"{name} must be a number with a unit of {unit}, got {value!r}")
         return converted
+
+    def field_named(self, name: str) -> FieldInfo:
+        """Return a field by its name.
+
+        Raises
+        ------
+        KeyError
+            If there is none of that name.
+        """
+        return type(self).model_fields[name]
 
     def quantities(self) -> dict[str, Any]:
         """Return the class as the configuration file would write it, units included."""
@@ -1126,23 +1080,94 @@ _RESERVED = ("config", "track", "guideway", "train", "figures", "tables", "check
 """Folders beside those of the cases."""
 
 
-class Case(Parameters):
-    """One case: its random gains, their variation, the number of spans and the methods."""
+class Law(Parameters):
+    """Law of one random quantity: mean and deviation, bounds, or a table."""
 
-    n_spans: int = _count(5, "number of spans, in place of guideway.n_spans")
+    law: Literal[
+        "normal",
+        "lognormal",
+        "uniform",
+        "triangular",
+        "truncated_normal",
+        "gumbel",
+        "weibull",
+        "beta",
+        "quantiles",
+        "sample",
+        "discrete",
+    ] = Field("normal", description="name of the law")
+    mean: float | str | None = Field(
+        None, description="mean, with its unit; left out: the configured value"
+    )
+    coefficient_of_variation: float | None = Field(
+        None, description="standard deviation over the mean [-]", gt=0, allow_inf_nan=False
+    )
+    deviation: float | str | None = Field(None, description="standard deviation, with its unit")
+    low: float | str | None = Field(None, description="lower bound, with its unit")
+    high: float | str | None = Field(None, description="upper bound, with its unit")
+    mode: float | str | None = Field(
+        None, description="likeliest value of a triangular law; left out: the configured value"
+    )
+    quantiles: tuple[tuple[float, float | str], ...] | None = Field(
+        None, description="table of [probability, value] from 0 to 1, linear between its rows"
+    )
+    values: tuple[float | str, ...] | None = Field(
+        None, description="values of a discrete law or of a sample, with their units"
+    )
+    probabilities: tuple[float, ...] | None = Field(
+        None, description="probability of each value of a discrete law; left out: all alike"
+    )
+    file: str | None = Field(
+        None,
+        description="CSV file with the values of a sample in its first column, the unit in the "
+        "heading in brackets; path relative to the configuration file",
+        json_schema_extra={"file": True},
+    )
+
+    @field_validator("law", mode="before")
+    @classmethod
+    def _as_one_word(cls, value: Any) -> Any:
+        return value.replace(" ", "_") if isinstance(value, str) else value
+
+    def quantities(self) -> dict[str, Any]:
+        """Return what the law says, as the configuration file would write it."""
+        said = {name: value for name, value in super().quantities().items() if value is not None}
+        if self.quantiles is not None:
+            said["quantiles"] = [list(row) for row in self.quantiles]
+        return said
+
+
+def _all_gains(variation: float = 0.10, among: tuple[Gain, ...] = GAIN_KEYS) -> dict[str, Law]:
+    """Independent normal gains of one coefficient of variation."""
+    return {f"gains.{gain}": Law(coefficient_of_variation=variation) for gain in among}
+
+
+class Case(Parameters):
+    """One case: what is random in it and how, its own values, and the methods."""
+
+    n_spans: int | None = Field(
+        None, description="number of spans of this case; null: guideway.n_spans", ge=1
+    )
     set: Mapping[str, Any] = Field(
         {},
         description="values of this case alone by the dotted keys of train, guideway, "
         "irregularity, gains, control and passage, such as {control.suspension.group: ends}",
     )
-    coefficient_of_variation: float = Field(
-        0.10,
-        description="standard deviation of each random gain over its mean; normal, independent",
-        gt=0,
-        allow_inf_nan=False,
+    random: Mapping[str, Law] = Field(
+        _all_gains(),
+        description="what is random, by its dotted key, and its law; all else has its configured "
+        "value; null makes a key fixed that a file below makes random",
+        json_schema_extra={"names": r"^[a-z_0-9]+(\.[a-z_0-9]+)+$"},
     )
-    random_gains: tuple[Gain, ...] = Field(
-        GAIN_KEYS, description="gains that are random; the others stay at their means", min_length=1
+    correlation: tuple[tuple[str, str, float], ...] = Field(
+        (),
+        description="linear correlation of pairs of random quantities: [key, key, coefficient]; "
+        "pairs left out are uncorrelated",
+    )
+    track: Literal["fixed", "random"] | int = Field(
+        "fixed",
+        description="fixed: the track of the seed; random: each run has a track of its own; or a "
+        "number of tracks that the runs share in turns",
     )
     methods: tuple[Method, ...] = Field(
         ("asm",), description="methods that the target `all` runs", min_length=1
@@ -1150,55 +1175,147 @@ class Case(Parameters):
     n_samples: int | None = Field(
         None, description="runs of its baseline; null: study.mcm.n_samples", ge=2
     )
-    random_track: bool = Field(
-        False, description="whether each sample has an irregularity of its own (mcm only)"
-    )
 
     def __hash__(self) -> int:
         return hash(repr(self))
 
+    @property
+    def random_track(self) -> bool:
+        """Whether runs differ in their track."""
+        return self.track != "fixed"
+
     @model_validator(mode="before")
     @classmethod
-    def _refuse_correlation(cls, data: Any) -> Any:
-        for key in data if isinstance(data, Mapping) else ():
-            if "correlat" in str(key):
-                raise ValueError(
-                    f"{key} is not supported: the random gains are independent; leave it out"
-                )
-        return data
+    def _refuse_old_keys(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        for old, new in _NEW_FORM.items():
+            if old in data:
+                raise ValueError(f"{old} is no longer a key: write {new}")
+        random = data.get("random")
+        if not isinstance(random, Mapping):
+            return data
+        return {**data, "random": {key: law for key, law in random.items() if law is not None}}
+
+    @field_validator("track", mode="before")
+    @classmethod
+    def _check_track(cls, value: Any) -> Any:
+        if value in ("fixed", "random") or (type(value) is int and value >= 2):
+            return value
+        raise ValueError(
+            f"track must be fixed, random or a number of tracks from 2, got {value!r}"
+        )
 
     @model_validator(mode="after")
     def _check(self) -> Case:
-        for key, names in (("random_gains", self.random_gains), ("methods", self.methods)):
-            if len(set(names)) < len(names):
-                raise ValueError(f"{key} must not name anything twice, got {', '.join(names)}")
-        if self.random_track and self.methods != ("mcm",):
-            others = ", ".join(name for name in self.methods if name != "mcm")
+        if len(set(self.methods)) < len(self.methods):
+            raise ValueError(f"methods must not name anything twice, got {', '.join(self.methods)}")
+        if not self.random:
             raise ValueError(
-                f"random_track works with the method mcm only, got {others}: a surrogate of the "
-                "gains cannot know the track of each sample"
+                "random must name at least one quantity, such as "
+                "{gains.suspension_proportional: {law: normal, coefficient_of_variation: 0.1}}"
             )
+        if self.n_spans is not None and "guideway.n_spans" in {*self.set, *self.random}:
+            raise ValueError("n_spans says what guideway.n_spans says too; leave one of them out")
+        for key in self.random:
+            if key in self.set:
+                raise ValueError(f"{key} is both set and random; leave one of them out")
+        self._check_correlation()
         return self
+
+    def _check_correlation(self) -> None:
+        """Refuse pairs that are not two random quantities, and coefficients that cannot be."""
+        seen = set()
+        for one, other, coefficient in self.correlation:
+            for key in (one, other):
+                if key not in self.random:
+                    raise ValueError(
+                        f"correlation: {key} is not random; the random ones are "
+                        f"{', '.join(self.random)}"
+                    )
+            pair = frozenset((one, other))
+            if len(pair) < 2 or pair in seen:
+                raise ValueError(
+                    f"correlation: {one} and {other} must be two quantities, named once"
+                )
+            seen.add(pair)
+            if not abs(coefficient) < 1:
+                raise ValueError(
+                    f"correlation of {one} and {other} must lie between -1 and 1, "
+                    f"got {coefficient:g}"
+                )
+        if seen and min(_eigenvalues(self.correlation_matrix)) <= 0:
+            raise ValueError(
+                "correlation: these coefficients contradict each other, their matrix is not "
+                f"positive definite: {', '.join(f'{a}, {b}: {r:g}' for a, b, r in self.correlation)}"
+            )
+
+    @property
+    def correlation_matrix(self) -> tuple[tuple[float, ...], ...]:
+        """Linear correlation of the random quantities, in their order [-]."""
+        keys = list(self.random)
+        rows = [[float(j == k) for k in range(len(keys))] for j in range(len(keys))]
+        for one, other, coefficient in self.correlation:
+            j, k = keys.index(one), keys.index(other)
+            rows[j][k] = rows[k][j] = coefficient
+        return tuple(tuple(row) for row in rows)
+
+
+_NEW_FORM = {
+    "random_gains": "the gains with their laws under random, such as "
+    "random: {gains.suspension_proportional: {law: normal, coefficient_of_variation: 0.1}}",
+    "coefficient_of_variation": "it into the law of each quantity, such as "
+    "random: {gains.suspension_proportional: {law: normal, coefficient_of_variation: 0.1}}",
+    "random_track": "track: random",
+}
+"""What stands in place of keys of earlier versions."""
+
+
+def _eigenvalues(matrix: tuple[tuple[float, ...], ...]) -> list[float]:
+    import numpy as np
+
+    return list(np.linalg.eigvalsh(np.array(matrix)))
 
 
 def _cases() -> dict[str, Case]:
     """The cases of the paper, and those of who shares a circuit and how late its current comes."""
-    cases = {"validation": Case(methods=("mcm", "osm", "asm_paper", "asm"))}
+    cases = {"validation": Case(n_spans=5, methods=("mcm", "osm", "asm_paper", "asm"))}
     for gain in GAIN_KEYS:
-        cases[f"only_{gain}"] = Case(n_spans=20, random_gains=(gain,))
+        cases[f"only_{gain}"] = Case(n_spans=20, random=_all_gains(among=(gain,)))
     cases["all_gains"] = Case(n_spans=20)
     for percent in range(4, 16, 2):
-        cases[f"cov_{percent:03d}"] = Case(coefficient_of_variation=percent / 100)
+        cases[f"cov_{percent:03d}"] = Case(n_spans=5, random=_all_gains(percent / 100))
     for name, key, value in (
         *((f"group_{group}", "group", group) for group in GROUPS if group != "pole"),
         ("lag_2ms", "lag", "2 ms"),
     ):
         cases[name] = Case(
+            n_spans=5,
             set={f"control.{kind}.{key}": value for kind in ("suspension", "guidance")},
             methods=("mcm", "asm"),
             n_samples=2000,
         )
     return cases
+
+
+class PaperFigures(Parameters):
+    """Cases that the numbered figures and tables of the paper compare, in the order of legends."""
+
+    compared: str = Field(
+        "validation", description="case by every method: figures 9 to 12, tables, the line"
+    )
+    by_gain: tuple[str, ...] = Field(
+        (*(f"only_{gain}" for gain in GAIN_KEYS), "all_gains"),
+        description="cases with each gain random alone, and with all: figures 13 and 14",
+    )
+    by_variation: tuple[str, ...] = Field(
+        tuple(f"cov_{percent:03d}" for percent in range(4, 16, 2)),
+        description="cases whose gains vary ever more: figures 15 and 16",
+    )
+    by_control: tuple[str, ...] = Field(
+        ("validation", *(f"group_{group}" for group in GROUPS if group != "pole"), "lag_2ms"),
+        description="cases of who shares a circuit and how late its current comes",
+    )
 
 
 _OF_A_CASE = ("train", "guideway", "irregularity", "gains", "control", "passage")
@@ -1216,15 +1333,30 @@ def _with_value(section: Any, keys: list[str], value: Any) -> Any:
     return section.model_copy(update={first: inner})
 
 
+def _field_at(section: Any, keys: list[str]) -> tuple[FieldInfo, Any]:
+    """Field and value at nested keys of a section.
+
+    Raises
+    ------
+    KeyError
+        With the first key that there is not.
+    """
+    first, *rest = keys
+    if not hasattr(section, "field_named"):
+        raise KeyError(first)
+    field, value = section.field_named(first), getattr(section, first)
+    return _field_at(value, rest) if rest else (field, value)
+
+
+TAIL = 1e-6
+"""Probability of a law that may lie where the model makes no sense [-]; assumed: far below what a
+study with such a law can tell."""
+
+
 BORDER_OF_HALF = {"suspension": 1.246, "guidance": 1.396}
 """Least stable k_p over i0/delta0 where circuits are fed by the mean gap of their half: of one
 linearised car with the default masses and springs (docs/theory/control.md); of the other groups it
 is 1.  Another train has others, so that they serve for a first check only."""
-
-
-def _normal_cdf(u: float) -> float:
-    """Standard normal distribution function."""
-    return 0.5 * math.erfc(-u / math.sqrt(2.0))
 
 
 RAW_CUTOFF, RAW_STEP = 2000.0, 0.06e-3
@@ -1252,6 +1384,10 @@ class Config(Parameters):
     passage: Passage = Passage()
     validation: Validation = Validation()
     study: Study = Study()
+    figures: PaperFigures = PaperFigures()
+    only: tuple[str, ...] | None = Field(
+        None, description="names of the cases that are run, in their order; null: all"
+    )
     cases: Mapping[str, Case] = Field(
         _cases(),
         description="the cases by name; null removes a case that a file below names",
@@ -1271,6 +1407,20 @@ class Config(Parameters):
         whole = super().quantities()
         removed: dict[str, Any] = {name: None for name in _cases() if name not in self.cases}
         return {**whole, "cases": {**whole["cases"], **removed}}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _keep_only(cls, data: Any) -> Any:
+        """Leave the cases away that are not among those of ``only``."""
+        only = data.get("only") if isinstance(data, Mapping) else None
+        cases = data.get("cases", _cases()) if isinstance(data, Mapping) else None
+        if not isinstance(only, list | tuple) or not isinstance(cases, Mapping) or not cases:
+            return data
+        for name in only:
+            if cases.get(name) is None:
+                raise ValueError(f"only names '{name}', which is no case; there are: "
+                                 f"{', '.join(key for key, one in cases.items() if one)}")
+        return {**data, "cases": {name: cases[name] for name in only}}
 
     @field_validator("cases", mode="before")
     @classmethod
@@ -1308,8 +1458,6 @@ class Config(Parameters):
                     f"{place}{dotted} cannot be set for a case alone; the sections that can are "
                     f"{', '.join(_OF_A_CASE)}, such as passage.speed"
                 )
-            if dotted == "guideway.n_spans":
-                raise UserError(f"{place}{dotted} is the case's n_spans: write it there")
             try:
                 changed = _with_value(changed, keys, value)
             except ValidationError as error:
@@ -1344,15 +1492,68 @@ class Config(Parameters):
         if name not in self.cases:
             raise UserError(f"there is no case '{name}', known are: {', '.join(self.cases)}")
         own = self.with_case_set(name)
-        guideway = own.guideway.model_copy(update={"n_spans": own.cases[name].n_spans})
+        n_spans = own.cases[name].n_spans
+        if n_spans is None:
+            return own
+        guideway = own.guideway.model_copy(update={"n_spans": n_spans})
         return own.model_copy(update={"guideway": guideway})
 
-    def statically_stable(self, case: Case) -> float:
+    def unit_of(self, key: str) -> str:
+        """SI unit of a quantity by its dotted key; empty for a pure number.
+
+        Raises
+        ------
+        UserError
+            If the key is none of a case's, or its value is no number.
+        """
+        keys = key.split(".")
+        if keys[0] not in _OF_A_CASE or len(keys) < 2:
+            raise UserError(
+                f"{key} cannot be random; the sections whose numbers can are "
+                f"{', '.join(_OF_A_CASE)}, such as train.car_body.mass"
+            )
+        try:
+            field, value = _field_at(self, keys)
+        except KeyError as error:
+            raise UserError(
+                f"{key} is no key of the configuration: there is no {error.args[0]!r}"
+            ) from None
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise UserError(f"{key} cannot be random: its value is no number, but {value!r}")
+        extra = field.json_schema_extra
+        return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+    def value_of(self, key: str) -> float:
+        """Number at a dotted key, in SI."""
+        return float(_field_at(self, key.split("."))[1])
+
+    def distribution(self, name: str, key: str) -> laws.Distribution:
+        """Distribution of a random quantity of a case, in SI.
+
+        Parameters
+        ----------
+        name
+            Name of the case, whose own values are those of all already.
+        key
+            Dotted key of the quantity.
+
+        Raises
+        ------
+        UserError
+            If the key is no number of the configuration, or there is no such law.
+        """
+        unit = self.unit_of(key)
+        try:
+            return laws.distribution(self.cases[name].random[key], self.value_of(key), unit, key)
+        except ValueError as error:
+            raise UserError(str(error)) from None
+
+    def statically_stable(self, name: str) -> float:
         """Probability that the gains of a case can hold the train statically [-].
 
         A magnet pulls more the closer it is, so its k_p must exceed i₀/δ₀, times `BORDER_OF_HALF`
         for the group ``half``, and its k_d must not be negative.  What lag and delay take away is
-        not in it.
+        not in it; gains count as independent.
 
         References
         ----------
@@ -1367,11 +1568,10 @@ class Config(Parameters):
                 (f"{kind}_proportional", factor * magnet.current_reference / magnet.gap_reference),
                 (f"{kind}_derivative", 0.0),
             ):
-                mean = getattr(self.gains, gain)
-                if gain in case.random_gains:
-                    deviation = case.coefficient_of_variation * mean
-                    probability *= _normal_cdf((mean - least) / deviation)
-                elif mean < least:
+                if f"gains.{gain}" in self.cases[name].random:
+                    of_gain = self.distribution(name, f"gains.{gain}")
+                    probability *= 1.0 - float(of_gain.cdf(least))
+                elif getattr(self.gains, gain) < least:
                     return 0.0
         return probability
 
@@ -1381,26 +1581,78 @@ class Config(Parameters):
             if case.set:
                 own = self.with_case_set(name)
                 type(self).model_validate(own.quantities() | {"cases": {}})
-                own._check_case(name, own.cases[name])
+                own._check_case(name)
             else:
-                self._check_case(name, case)
+                self._check_case(name)
         return self
 
-    def _check_case(self, name: str, case: Case) -> None:
-        """Refuse a case whose gains cannot be random or hardly ever hold the train."""
-        for gain in case.random_gains:
-            if not getattr(self.gains, gain) > 0:
-                raise ValueError(
-                    f"cases.{name}.random_gains: {gain} cannot be random, its mean is zero"
-                )
-        stable = self.statically_stable(case)
+    def _check_case(self, name: str) -> None:
+        """Refuse a case whose laws make no sense or whose gains hardly ever hold the train."""
+        place = f"cases.{name}.random."
+        for key in self.cases[name].random:
+            try:
+                self._check_law(name, key)
+            except UserError as error:
+                raise ValueError(f"{place}{error}") from None
+        stable = self.statically_stable(name)
         if stable < 0.5:
             raise ValueError(
-                f"cases.{name}.coefficient_of_variation = {case.coefficient_of_variation:g} "
-                f"leaves only {100 * stable:.0f} % of the gains statically stable "
-                "(k_p > i0/delta0, more for the group half, k_d >= 0), expected at least half; "
-                "lower it, raise the mean gains or take the case away with null"
+                f"cases.{name}.random leaves only {100 * stable:.0f} % of the gains statically "
+                "stable (k_p > i0/delta0, more for the group half, k_d >= 0), expected at least "
+                "half; lower the variation, raise the mean gains or take the case away with null"
             )
+
+    def _check_law(self, name: str, key: str) -> None:
+        """Refuse a law with mass where the configuration would be refused."""
+        law = self.distribution(name, key)
+        whole = isinstance(_field_at(self, key.split("."))[1], int)
+        if whole:
+            values = law.values if isinstance(law, laws.Discrete) else ()
+            if not values or any(value != round(value) for value in values):
+                raise UserError(f"{key}: it counts, so that its law must be discrete, of integers")
+        if isinstance(law, laws.Discrete):
+            for value in law.values:
+                why = self._why_not(key, value)
+                if why:
+                    raise UserError(f"{key}: its value {value:g} makes no sense: {why}")
+            return
+        for quantile in (law.ppf, law.isf):
+            why = self._why_not(key, float(quantile(TAIL)))
+            if why:
+                share = self._share_refused(key, quantile)
+                raise UserError(
+                    f"{key}: {100 * share:.2g} % of the law lies where the model makes no sense "
+                    f"({why}); narrow the law, or take one with bounds, such as lognormal or "
+                    "truncated_normal"
+                )
+
+    def _why_not(self, key: str, value: float) -> str:
+        """Why a value will not do; empty if it will."""
+        try:
+            changed = self.with_values({key: self._written(key, value)})
+            if not key.startswith("gains."):  # what gains must fit is their own section alone
+                type(self).model_validate(changed.quantities() | {"cases": {}})
+        except UserError as error:
+            return str(error).removeprefix(f"{key}: ").replace("Input should be", "it must be")
+        except ValidationError as error:
+            why = error.errors()[0]["msg"].removeprefix("Value error, ")
+            return why.replace("Input should be", "it must be")
+        return ""
+
+    def _written(self, key: str, value: float) -> Any:
+        """A number in SI as the configuration file would write it."""
+        unit = self.unit_of(key)
+        if isinstance(_field_at(self, key.split("."))[1], int):
+            return round(value)
+        return f"{value!r} {unit}" if unit else value
+
+    def _share_refused(self, key: str, quantile: Callable[[float], Any]) -> float:
+        """Probability, from one end of a law on, of values that will not do."""
+        low, high = TAIL, 1.0
+        for _ in range(30):
+            share = math.sqrt(low * high)
+            low, high = (share, high) if self._why_not(key, float(quantile(share))) else (low, share)
+        return low
 
     @model_validator(mode="after")
     def _check(self) -> Config:

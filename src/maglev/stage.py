@@ -25,6 +25,7 @@ from maglev.vocabulary import BASELINE, METHODS, Method
 
 if TYPE_CHECKING:
     import xarray as xr
+    from pydantic.fields import FieldInfo
 
 _FOLDER = Path(__file__).parent / "stages"
 
@@ -167,7 +168,7 @@ class Stage:
             own = {"methods": [method or BASELINE], **part.get("cases", {}).get(case, {})}
             part["cases"] = {**dict.fromkeys(whole["cases"]), case: own}
             if "guideway" in part:
-                n_spans = whole["cases"][case]["n_spans"]
+                n_spans = whole["cases"][case]["n_spans"] or whole["guideway"]["n_spans"]
                 part["guideway"] = {**part["guideway"], "n_spans": n_spans}
         return part
 
@@ -309,6 +310,17 @@ class View:
 
     def __contains__(self, name: object) -> bool:
         return name in set(self)
+
+    def field_named(self, name: str) -> FieldInfo:
+        """Field of the section by its name.
+
+        Raises
+        ------
+        KeyError
+            If it has none of that name.
+        """
+        assert isinstance(self._section, Parameters)
+        return self._section.field_named(name)
 
     def model_copy(self, *, update: Mapping[str, Any]) -> View:
         """The same view of a section with other values of some keys, which it must have read."""

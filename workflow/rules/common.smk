@@ -3,7 +3,7 @@
 
 
 STORE = f"results/.store/{config['run']}"
-TABLE_CASE = "validation"
+TABLE_CASE = parameters.figures.compared
 
 
 def methods_of(case: str, among: tuple[str, ...] = METHODS) -> list[str]:
@@ -17,19 +17,21 @@ def checked_cases(every: bool) -> list[str]:
     return [
         case
         for case in parameters.cases
-        if not parameters.cases[case].random_track
+        if parameters.cases[case].track == "fixed"
         and (every or BASELINE in methods_of(case))
     ]
 
 
-# cases of who shares a circuit and how late its current comes, beside the case of the tables
+def named_cases(names: tuple[str, ...]) -> list[str]:
+    """Those of some cases that there are."""
+    return [case for case in names if case in parameters.cases]
+
+
 CONTROL_CASES = [
     case
-    for case in parameters.cases
-    if case.startswith(("group_", "lag_", "delay_")) and methods_of(case, DESIGNED)
+    for case in named_cases(parameters.figures.by_control)
+    if methods_of(case, DESIGNED)
 ]
-if CONTROL_CASES and methods_of(TABLE_CASE, DESIGNED):
-    CONTROL_CASES.insert(0, TABLE_CASE)
 
 
 def place(stage: str, **names: str) -> str:

@@ -1,11 +1,9 @@
 # Which files the cases of the configuration and their methods have, for figures and targets.
 
 
-GAIN_CASES = [
-    case for case in parameters.cases if case.startswith("only_") or case == "all_gains"
-]
-VARIATION_CASES = [case for case in parameters.cases if case.startswith("cov_")]
-TRACK_CASES = [case for case in parameters.cases if parameters.cases[case].random_track]
+GAIN_CASES = named_cases(parameters.figures.by_gain)
+VARIATION_CASES = named_cases(parameters.figures.by_variation)
+TRACK_CASES = [case for case in parameters.cases if parameters.cases[case].track == "random"]
 
 
 def judged(case: str) -> bool:

@@ -148,7 +148,7 @@ class _Design:
 
     def _content(self) -> dict[str, object]:
         """All settings that decide the rounds, without stopping rule and final surrogate."""
-        chosen = case_of(self.config, self.case)
+        chosen = case_of(self.config, self.case).quantities()
         quantities = self.settings.quantities()
         later = {"threshold", "n_rounds", "n_largest", "n_runs"}
         if self.method == "asm":
@@ -156,8 +156,9 @@ class _Design:
         return {
             **content(self.config.of_case(self.case)),
             "gains": self.config.gains.quantities(),
-            "coefficient_of_variation": chosen.coefficient_of_variation,
-            "random_gains": list(chosen.random_gains),
+            "random": list(chosen["random"].items()),
+            "correlation": chosen["correlation"],
+            "track": chosen["track"],
             "failure_probability": list(self.levels),
             self.method: {k: v for k, v in quantities.items() if k not in later},
             "points": {name: _hash(one["standard"].values) for name, one in self.points.items()},
