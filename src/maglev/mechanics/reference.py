@@ -228,12 +228,12 @@ def _note(record: Record, step: int, every: int, of: System, at: Watch, state: S
 def _power(of: System, state: State) -> FloatArray:
     """Power of the magnets on train and guideway, and dissipated power [W], (3, sample)."""
     v_t, v_g = state.train.v, state.guideway.v
-    lost = of.train.dissipated(v_t) + of.guideway.dissipated(v_g)
+    dissipated = of.train.dissipated(v_t) + of.guideway.dissipated(v_g)
     on_train, on_guideway = (
         (state.on_train * v_t).sum(axis=0),
         (state.on_guideway * v_g).sum(axis=0),
     )
-    return np.stack([on_train, on_guideway, lost])
+    return np.stack([on_train, on_guideway, dissipated])
 
 
 def _stored(of: System, state: State) -> FloatArray:
@@ -448,7 +448,7 @@ def solve(
     Parameters
     ----------
     config
-        Parameters of everything; ``passage.time_step`` only decides where the run starts.
+        Parameters of everything; ``passage.time_step`` only decides where the passage starts.
     profile
         Track irregularity.
     gains : (sample, 4) or (sample, 8)
@@ -512,8 +512,8 @@ def extrapolated(coarse: Record, fine: Record) -> Record:
         correction = (other[1::2] - one) / 3
         return other + CubicSpline(coarse.time, correction)(fine.time)
 
-    lost = np.where(coarse.fate.status != 0, coarse.fate.status, fine.fate.status)
-    fate = replace(fine.fate, status=lost) if (lost != fine.fate.status).any() else fine.fate
+    status = np.where(coarse.fate.status != 0, coarse.fate.status, fine.fate.status)
+    fate = replace(fine.fate, status=status) if (status != fine.fate.status).any() else fine.fate
     changed = {name: better(name) for name in ("girder", "body_z", "body_y")}
     return replace(fine, fate=fate, **changed)
 

@@ -107,11 +107,11 @@ class Structure:
         return a
 
     def dissipated(self, v: FloatArray) -> FloatArray:
-        """Power lost to damping (sample,) [W]."""
-        lost = (v * (self.damping @ v)).sum(axis=0)
+        """Power dissipated by damping (sample,) [W]."""
+        power = (v * (self.damping @ v)).sum(axis=0)
         if self.coefficient.size:
-            lost += (self.coefficient * (self.modes @ v) ** 2).sum(axis=0)
-        return lost
+            power += (self.coefficient * (self.modes @ v) ** 2).sum(axis=0)
+        return power
 
     def predicted(self, before: Motion) -> Motion:
         """Predictor: the motion a step later without its acceleration."""
