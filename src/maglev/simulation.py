@@ -78,11 +78,10 @@ def simulate(
     UserError
         If the gains have another shape or are not finite, the time step exceeds the stability
         limit, the irregularity does not cover the passage, the solver is unknown, or the seeds are
-        not whole numbers from zero, one for each sample of the production solver.
+        not whole numbers from zero, one for each sample of the production solver, or the reference
+        solver does not reach its accuracy.
     FileNotFoundError
         If the irregularity's file does not exist.
-    RuntimeError
-        If the reference solver does not reach its accuracy.
 
     References
     ----------

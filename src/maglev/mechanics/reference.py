@@ -23,6 +23,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course
@@ -375,9 +376,7 @@ def integrate(
     Raises
     ------
     UserError
-        If the gains have the wrong shape or are not finite.
-    RuntimeError
-        If a step does not converge.
+        If the gains have the wrong shape or are not finite, or if a step does not converge.
 
     References
     ----------
@@ -470,9 +469,8 @@ def solve(
     Raises
     ------
     UserError
-        If the gains have the wrong shape or are not finite.
-    RuntimeError
-        If a step does not converge, or if the error is above the tolerance with the shortest step.
+        If the gains have the wrong shape or are not finite, a step does not converge, or the error
+        exceeds the tolerance even with the shortest step.
 
     References
     ----------
@@ -498,7 +496,7 @@ def solve(
         if not (error > tolerance).any() and (before is not None or have_faces):
             return passages_of(better, rows), effort
         coarse, before = fine, six_extremes(better)
-    raise RuntimeError(
+    raise UserError(
         f"reference: expected errors of at most {100 * tolerance:g} %, got {_told(effort)}; "
         "raw accelerations may have no limit: give passage.acceleration_band"
     )
