@@ -189,8 +189,8 @@ class Spans(NamedTuple):
     rest: np.ndarray  # (3, stride) midspan z by z, y by roll and y of its left-out modes [m/N]
 
 
-class Places(NamedTuple):
-    """What a pole's face meets at every place it can be at after a whole number of steps."""
+class Footprints(NamedTuple):
+    """Rail under a pole's face, wherever the face can be after a whole number of steps."""
 
     number: np.ndarray  # (row, pole) place at time zero; each step moves on by one
     first: np.ndarray  # (place,) first of the rail coefficients under the face
@@ -201,8 +201,8 @@ class Places(NamedTuple):
     ramp: np.ndarray  # (place, side, 1 or LANES) its rate at the pole [m/s]
 
 
-class Run(NamedTuple):
-    """One passage and how it is watched."""
+class Timing(NamedTuple):
+    """Steps and speed of a passage, bounds of the gaps, and how responses are watched."""
 
     first_step: int  # until then the train rests
     n_steps: int
