@@ -19,6 +19,7 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
@@ -101,6 +102,10 @@ def quantity(
     )
 
 
+_IN_SI = {"numbers": "SI"}
+"""Context of a validation whose numbers are in SI and carry no unit."""
+
+
 class Parameters(BaseModel):
     """Base of all parameter classes: frozen, no unknown keys, quantities read with their unit."""
 
@@ -108,8 +113,8 @@ class Parameters(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _read_units(cls, data: Any) -> Any:
-        if not isinstance(data, dict):
+    def _read_units(cls, data: Any, info: ValidationInfo) -> Any:
+        if not isinstance(data, dict) or info.context is _IN_SI:
             return data
         converted = dict(data)
         for name, value in data.items():
@@ -1353,6 +1358,23 @@ TAIL = 1e-6
 study with such a law can tell."""
 
 
+def _with_numbers(section: Parameters, nested: Mapping[str, Any], place: str) -> Any:
+    """Copy of a section with other numbers in SI, all of its checks made once."""
+    fields = dict(section.__dict__)
+    for name, value in nested.items():
+        if isinstance(value, Mapping):
+            value = _with_numbers(fields[name], value, f"{place}{name}.")
+        fields[name] = value
+    try:
+        return type(section).model_validate(fields, context=_IN_SI)
+    except ValidationError as error:
+        found = error.errors()[0]
+        why = found["msg"].removeprefix("Value error, ")
+        if not found["loc"]:  # of the section as a whole: the sentence begins with a key of it
+            raise UserError(f"{place}{why}") from None
+        raise UserError(f"{place}{found['loc'][0]}: {why}, got {found['input']!r}") from None
+
+
 BORDER_OF_HALF = {"suspension": 1.246, "guidance": 1.396}
 """Least stable k_p over i0/delta0 where circuits are fed by the mean gap of their half: of one
 linearised car with the default masses and springs (docs/theory/control.md); of the other groups it
@@ -1469,6 +1491,84 @@ class Config(Parameters):
                     f"there is no {error.args[0]!r}"
                 ) from None
         return changed
+
+    def number_at(self, key: str) -> tuple[float, str]:
+        """Return the number at a dotted key, in SI, and its unit.
+
+        Parameters
+        ----------
+        key
+            Such as ``"train.car_body.mass"``.
+
+        Returns
+        -------
+        number, unit
+            The unit in the notation of pint; empty for a count or a pure number.
+
+        Raises
+        ------
+        UserError
+            If there is no such key, or no number at it.
+
+        Examples
+        --------
+        >>> Config().number_at("train.car_body.mass")
+        (39000.0, 'kg')
+        """
+        section: Any = self
+        *outer, last = key.split(".")
+        for name in [*outer, last]:
+            if not isinstance(section, Parameters) or name not in type(section).model_fields:
+                raise UserError(f"{key} is no key of the configuration: there is no {name!r}")
+            parent, section = section, getattr(section, name)
+        if isinstance(section, bool) or not isinstance(section, int | float):
+            raise UserError(f"{key} must be a number to be given in numbers, it is {section!r}")
+        extra = type(parent).model_fields[last].json_schema_extra
+        unit = extra.get("unit") if isinstance(extra, dict) else None
+        return float(section), str(unit or "")
+
+    def with_numbers(self, numbers: Mapping[str, float], place: str = "") -> Config:
+        """Return the configuration with other numbers at dotted keys, in SI.
+
+        The same checks are made as of a file; the cases are left as they are.
+
+        Parameters
+        ----------
+        numbers
+            In SI, such as ``{"passage.speed": 120.0}``.
+        place
+            What they belong to, for messages.
+
+        Raises
+        ------
+        UserError
+            If there is no number at a key, or a number will not do.
+
+        Examples
+        --------
+        >>> Config().with_numbers({"guideway.pier.height": 12.0}).guideway.pier.height
+        12.0
+        """
+        nested: dict[str, Any] = {}
+        for key, number in numbers.items():
+            self.number_at(key)
+            *outer, last = key.split(".")
+            inner = nested
+            for name in outer:
+                inner = inner.setdefault(name, {})
+            inner[last] = number
+        changed = {
+            name: _with_numbers(getattr(self, name), value, f"{place}{name}.")
+            if isinstance(value, Mapping)
+            else value
+            for name, value in nested.items()
+        }
+        config = self.model_copy(update=changed)
+        try:
+            config._check_sections()
+        except ValueError as error:
+            raise UserError(f"{place}{error}") from None
+        return config
 
     def with_case_set(self, name: str) -> Config:
         """Return the configuration in which a case's own values are those of all.
@@ -1630,22 +1730,10 @@ class Config(Parameters):
     def _why_not(self, key: str, value: float) -> str:
         """Why a value will not do; empty if it will."""
         try:
-            changed = self.with_values({key: self._written(key, value)})
-            if not key.startswith("gains."):  # what gains must fit is their own section alone
-                type(self).model_validate(changed.quantities() | {"cases": {}})
+            self.with_numbers({key: value})
         except UserError as error:
             return str(error).removeprefix(f"{key}: ").replace("Input should be", "it must be")
-        except ValidationError as error:
-            why = error.errors()[0]["msg"].removeprefix("Value error, ")
-            return why.replace("Input should be", "it must be")
         return ""
-
-    def _written(self, key: str, value: float) -> Any:
-        """A number in SI as the configuration file would write it."""
-        unit = self.unit_of(key)
-        if isinstance(_field_at(self, key.split("."))[1], int):
-            return round(value)
-        return f"{value!r} {unit}" if unit else value
 
     def _share_refused(self, key: str, quantile: Callable[[float], Any]) -> float:
         """Probability, from one end of a law on, of values that will not do."""
@@ -1657,6 +1745,11 @@ class Config(Parameters):
 
     @model_validator(mode="after")
     def _check(self) -> Config:
+        self._check_sections()
+        return self
+
+    def _check_sections(self) -> None:
+        """Refuse sections that do not fit each other."""
         for kind in ("suspension", "guidance"):
             magnet = getattr(self.train, f"{kind}_magnet")
             if not self.passage.gap_contact < magnet.gap_reference < self.passage.gap_lost:
@@ -1688,4 +1781,3 @@ class Config(Parameters):
                 f"irregularity.fade_in must not exceed passage.approach = "
                 f"{self.passage.approach:g} m, got {self.irregularity.fade_in:g} m"
             )
-        return self
