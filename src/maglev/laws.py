@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -58,20 +59,18 @@ class Distribution(Protocol):
         """Quantiles by the probability above."""
 
 
-class Written(Protocol):
-    """A law as it stands in the configuration; what is left out is None."""
-
-    law: str
-    mean: Any
-    coefficient_of_variation: float | None
-    deviation: Any
-    low: Any
-    high: Any
-    mode: Any
-    quantiles: Any
-    values: Any
-    probabilities: Any
-    file: str | None
+_NUMBERS = (
+    "mean",
+    "coefficient_of_variation",
+    "deviation",
+    "low",
+    "high",
+    "mode",
+    "quantiles",
+    "values",
+    "probabilities",
+)
+"""What a law can say of itself."""
 
 
 @dataclass(frozen=True)
@@ -151,13 +150,13 @@ class Discrete:
         return self.ppf(1.0 - np.asarray(q))
 
 
-def distribution(law: Written, present: float, unit: str, key: str) -> Distribution:
+def distribution(law: Any, present: float, unit: str, key: str) -> Distribution:
     """Distribution of a random quantity.
 
     Parameters
     ----------
     law
-        As it stands in the configuration.
+        As it stands in the configuration: `maglev.parameters.Law`.
     present
         Configured value of the quantity [unit]: the mean where the law names none, and the mode
         of a triangular one.
@@ -189,7 +188,7 @@ def distribution(law: Written, present: float, unit: str, key: str) -> Distribut
 class _Numbers:
     """Numbers of a law in SI, each asked for by name."""
 
-    def __init__(self, law: Written, present: float, unit: str, key: str) -> None:
+    def __init__(self, law: Any, present: float, unit: str, key: str) -> None:
         self.law, self.present, self.unit, self.key = law, present, unit, key
 
     def refuse(self, why: str) -> ValueError:
@@ -226,8 +225,7 @@ class _Numbers:
 
     def only(self, *names: str) -> None:
         """Refuse what this law does not go by."""
-        every = set(Written.__annotations__) - {"law", "file"}
-        extra = sorted(name for name in every - set(names) if self.given(name))
+        extra = [name for name in _NUMBERS if name not in names and self.given(name)]
         if extra:
             raise self.refuse(
                 f"a law '{self.law.law}' goes by {', '.join(names)}, got {', '.join(extra)} besides"
@@ -469,7 +467,7 @@ def _probability(n: _Numbers, value: Any) -> float:
 
 
 def _rises(numbers: Sequence[float]) -> bool:
-    return all(a < b for a, b in zip(numbers, numbers[1:], strict=False))
+    return all(a < b for a, b in pairwise(numbers))
 
 
 _MAKERS = {

@@ -1197,19 +1197,15 @@ class Case(Parameters):
         for old, new in _NEW_FORM.items():
             if old in data:
                 raise ValueError(f"{old} is no longer a key: write {new}")
+        track = data.get("track", "fixed")
+        if track not in ("fixed", "random") and not (type(track) is int and track >= 2):
+            raise ValueError(
+                f"track must be fixed, random or a number of tracks from 2, got {track!r}"
+            )
         random = data.get("random")
         if not isinstance(random, Mapping):
             return data
         return {**data, "random": {key: law for key, law in random.items() if law is not None}}
-
-    @field_validator("track", mode="before")
-    @classmethod
-    def _check_track(cls, value: Any) -> Any:
-        if value in ("fixed", "random") or (type(value) is int and value >= 2):
-            return value
-        raise ValueError(
-            f"track must be fixed, random or a number of tracks from 2, got {value!r}"
-        )
 
     @model_validator(mode="after")
     def _check(self) -> Case:
@@ -1250,9 +1246,10 @@ class Case(Parameters):
                     f"got {coefficient:g}"
                 )
         if seen and min(_eigenvalues(self.correlation_matrix)) <= 0:
+            pairs = ", ".join(f"{one}, {other}: {r:g}" for one, other, r in self.correlation)
             raise ValueError(
                 "correlation: these coefficients contradict each other, their matrix is not "
-                f"positive definite: {', '.join(f'{a}, {b}: {r:g}' for a, b, r in self.correlation)}"
+                f"positive definite: {pairs}"
             )
 
     @property
@@ -1440,8 +1437,10 @@ class Config(Parameters):
             return data
         for name in only:
             if cases.get(name) is None:
-                raise ValueError(f"only names '{name}', which is no case; there are: "
-                                 f"{', '.join(key for key, one in cases.items() if one)}")
+                raise ValueError(
+                    f"only names '{name}', which is no case; there are: "
+                    f"{', '.join(key for key, one in cases.items() if one)}"
+                )
         return {**data, "cases": {name: cases[name] for name in only}}
 
     @field_validator("cases", mode="before")
@@ -1677,6 +1676,11 @@ class Config(Parameters):
         return probability
 
     @model_validator(mode="after")
+    def _check(self) -> Config:
+        self._check_sections()
+        return self
+
+    @model_validator(mode="after")
     def _check_cases(self) -> Config:
         for name, case in self.cases.items():
             if case.set:
@@ -1729,6 +1733,8 @@ class Config(Parameters):
 
     def _why_not(self, key: str, value: float) -> str:
         """Why a value will not do; empty if it will."""
+        if key.startswith("gains.") and value > 0:  # nothing else is asked of a gain
+            return ""
         try:
             self.with_numbers({key: value})
         except UserError as error:
@@ -1740,13 +1746,10 @@ class Config(Parameters):
         low, high = TAIL, 1.0
         for _ in range(30):
             share = math.sqrt(low * high)
-            low, high = (share, high) if self._why_not(key, float(quantile(share))) else (low, share)
+            low, high = (
+                (share, high) if self._why_not(key, float(quantile(share))) else (low, share)
+            )
         return low
-
-    @model_validator(mode="after")
-    def _check(self) -> Config:
-        self._check_sections()
-        return self
 
     def _check_sections(self) -> None:
         """Refuse sections that do not fit each other."""

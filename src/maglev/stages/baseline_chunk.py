@@ -38,8 +38,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``runs``, with ``track_seed`` if runs of the case differ in their track; each sample under its
-        number in the baseline, all equally likely.
+        Layout ``runs``, with ``track_seed`` if runs of the case differ in their track; each sample
+        under its number in the baseline, all equally likely.
 
     Raises
     ------

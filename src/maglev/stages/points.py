@@ -175,9 +175,7 @@ def track_seeds(config: Config, n: int, stream: str = "track") -> IntArray:
     return generator(config.seed, stream).integers(0, 2**31, size=n)
 
 
-def seeds_of_tracks(
-    config: Config, case: str, n: int, stream: str = "track"
-) -> IntArray | None:
+def seeds_of_tracks(config: Config, case: str, n: int, stream: str = "track") -> IntArray | None:
     """Seeds (sample,) of the irregularities of the runs of a case; None if all meet one track.
 
     Parameters

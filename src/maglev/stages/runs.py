@@ -160,7 +160,8 @@ def stored_runs(
         raise UserError(
             f"track_seeds have shape {seeds.shape}, expected (sample,) = ({gains.shape[0]},)"
         )
-    varied = {key: np.array(values[key], dtype=np.float64) for key in sorted(values or {})}
+    given = values or {}
+    varied = {key: np.array(given[key], dtype=np.float64) for key in sorted(given)}
     for key, column in varied.items():
         if column.shape != gains.shape[:1]:
             raise UserError(f"{key} has shape {column.shape}, expected (sample,) = ({len(gains)},)")
@@ -212,9 +213,9 @@ def _compute(
     computed = simulate(
         config,
         np.column_stack([gains, *columns]),
+        values=others or None,
+        track_seeds=seeds,
         n_threads=n_threads,
-        **({} if seeds is None else {"track_seeds": seeds}),
-        **({"values": others} if others else {}),
     )
     if seeds is not None:
         computed["track_seed"] = (("sample",), seeds)
@@ -309,8 +310,12 @@ def runs(
         track_seeds=track_seeds,
         n_threads=n_threads,
     )
-    return passages.drop_dims("parameter", errors="ignore").assign(
-        standard=(("sample", "parameter"), standard),
-        value=(("sample", "parameter"), drawn),
-        probability=(("sample",), probability),
-    ).assign_coords(parameter=list(parameters(config, case)))
+    return (
+        passages.drop_dims("parameter", errors="ignore")
+        .assign(
+            standard=(("sample", "parameter"), standard),
+            value=(("sample", "parameter"), drawn),
+            probability=(("sample",), probability),
+        )
+        .assign_coords(parameter=list(parameters(config, case)))
+    )

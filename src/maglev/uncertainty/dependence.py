@@ -100,8 +100,8 @@ class Nataf:
             In the units of their laws.
         """
         variates = np.asarray(standard, dtype=np.float64) @ self.root.T
-        columns = [at_normal(law, column) for law, column in zip(self.laws, variates.T, strict=True)]
-        return np.column_stack(columns)
+        pairs = zip(self.laws, variates.T, strict=True)
+        return np.column_stack([at_normal(law, column) for law, column in pairs])
 
 
 def nataf(laws: Sequence[Law], correlation: npt.ArrayLike, names: Sequence[str]) -> Nataf:
@@ -152,7 +152,7 @@ def nataf(laws: Sequence[Law], correlation: npt.ArrayLike, names: Sequence[str])
                     series[j], series[k], target[j, k], (names[k], names[j])
                 )
     try:
-        root = np.linalg.cholesky(normal)
+        root: FloatArray = np.linalg.cholesky(normal).astype(np.float64)
     except np.linalg.LinAlgError:
         pairs = ", ".join(
             f"{names[k]}, {names[j]}: {target[j, k]:g}"
