@@ -65,6 +65,6 @@ rule truth:
         [
             file_of(stage, case=case, method=BASELINE)
             for stage in ("baseline", "density", "limits")
-            for case in parameters.cases
+            for case in CASES
         ],
         file_of("statistics_check", scope="statistics_truth"),

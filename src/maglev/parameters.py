@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any, Literal
 
 from pydantic import (
@@ -1158,6 +1158,11 @@ class Case(Parameters):
         description="values of this case alone by the dotted keys of train, guideway, "
         "irregularity, gains, control and passage, such as {control.suspension.group: ends}",
     )
+    sweep: Mapping[str, tuple[Any, ...]] = Field(
+        {},
+        description="one or two dotted keys with the values that make cases of this one, such as "
+        "{passage.speed: [300 km/h, 400 km/h]}; they are called by its name and a number",
+    )
     random: Mapping[str, Law] = Field(
         _all_gains(),
         description="what is random, by its dotted key, and its law; all else has its configured "
@@ -1216,13 +1221,40 @@ class Case(Parameters):
                 "random must name at least one quantity, such as "
                 "{gains.suspension_proportional: {law: normal, coefficient_of_variation: 0.1}}"
             )
-        if self.n_spans is not None and "guideway.n_spans" in {*self.set, *self.random}:
+        if self.n_spans is not None and "guideway.n_spans" in {
+            *self.set,
+            *self.random,
+            *self.sweep,
+        }:
             raise ValueError("n_spans says what guideway.n_spans says too; leave one of them out")
         for key in self.random:
             if key in self.set:
                 raise ValueError(f"{key} is both set and random; leave one of them out")
+        self._check_sweep()
         self._check_correlation()
         return self
+
+    def _check_sweep(self) -> None:
+        """Refuse a sweep over too many keys, over too few values, or over what is given already."""
+        if len(self.sweep) > 2:
+            raise ValueError(f"sweep takes one or two keys, got {', '.join(self.sweep)}")
+        for key, values in self.sweep.items():
+            for other, given in (("random", self.random), ("set", self.set)):
+                if key in given:
+                    raise ValueError(f"{key} is both swept and {other}; leave one of them out")
+            if len(values) < 2:
+                raise ValueError(f"sweep of {key} needs at least two values, got {len(values)}")
+
+    def settings(self) -> dict[str, dict[str, Any]]:
+        """Values of the swept keys of each case that the sweep makes, by what follows its name."""
+        keys, lists = list(self.sweep), list(self.sweep.values())
+        numbers = product(*(range(len(values)) for values in lists))
+        return {
+            "_".join(str(k + 1) for k in chosen): {
+                key: values[k] for key, values, k in zip(keys, lists, chosen, strict=True)
+            }
+            for chosen in (numbers if keys else ())
+        }
 
     def _check_correlation(self) -> None:
         """Refuse pairs that are not two random quantities, and coefficients that cannot be."""
@@ -1298,6 +1330,32 @@ def _cases() -> dict[str, Case]:
             n_samples=2000,
         )
     return cases
+
+
+def _swept(cases: Mapping[str, Any]) -> dict[str, Any]:
+    """Cases that the sweeps among some cases make, as a file would write them."""
+    made: dict[str, Any] = {}
+    for name, case in cases.items():
+        sweep = case.get("sweep") if isinstance(case, Mapping) else None
+        if not isinstance(sweep, Mapping) or not sweep:
+            continue
+        try:
+            settings = Case.model_validate(case).settings()
+        except ValidationError:
+            continue  # said when the case itself is checked
+        plain = {key: value for key, value in case.items() if key != "sweep"}
+        for number, values in settings.items():
+            one = {**plain, "set": {**(case.get("set") or {}), **values}}
+            taken = cases.get(f"{name}_{number}", one)
+            if taken is not None and not isinstance(taken, Case) and dict(taken) != one:
+                made_by = Case.model_validate(one)
+                if Case.model_validate(taken) != made_by:
+                    raise ValueError(
+                        f"cases.{name}.sweep makes a case {name}_{number}, which there is already; "
+                        "give one of them another name"
+                    )
+            made[f"{name}_{number}"] = one
+    return made
 
 
 class PaperFigures(Parameters):
@@ -1429,19 +1487,19 @@ class Config(Parameters):
 
     @model_validator(mode="before")
     @classmethod
-    def _keep_only(cls, data: Any) -> Any:
-        """Leave the cases away that are not among those of ``only``."""
-        only = data.get("only") if isinstance(data, Mapping) else None
+    def _arrange_cases(cls, data: Any) -> Any:
+        """Leave the cases away that are not among those of ``only``, and add those of sweeps."""
         cases = data.get("cases", _cases()) if isinstance(data, Mapping) else None
-        if not isinstance(only, list | tuple) or not isinstance(cases, Mapping) or not cases:
+        if not isinstance(cases, Mapping) or not cases:
             return data
-        for name in only:
-            if cases.get(name) is None:
-                raise ValueError(
-                    f"only names '{name}', which is no case; there are: "
-                    f"{', '.join(key for key, one in cases.items() if one)}"
-                )
-        return {**data, "cases": {name: cases[name] for name in only}}
+        only = data.get("only")
+        if isinstance(only, list | tuple):
+            for name in only:
+                if cases.get(name) is None:
+                    known = ", ".join(key for key, one in cases.items() if one is not None)
+                    raise ValueError(f"only names '{name}', which is no case; there are: {known}")
+            cases = {name: cases[name] for name in only}
+        return {**data, "cases": {**cases, **_swept(cases)}}
 
     @field_validator("cases", mode="before")
     @classmethod

@@ -6,9 +6,14 @@ STORE = f"results/.store/{config['run']}"
 TABLE_CASE = parameters.figures.compared
 
 
+# a case with a sweep stands for those that the sweep makes
+SWEEPS = [case for case in parameters.cases if parameters.cases[case].sweep]
+CASES = [case for case in parameters.cases if case not in SWEEPS]
+
+
 def methods_of(case: str, among: tuple[str, ...] = METHODS) -> list[str]:
     """Methods that a case names, of some."""
-    named = parameters.cases[case].methods if case in parameters.cases else ()
+    named = parameters.cases[case].methods if case in CASES else ()
     return [one for one in among if one in named]
 
 
@@ -16,7 +21,7 @@ def checked_cases(every: bool) -> list[str]:
     """Cases whose statistics can be checked: with a baseline of their own, or all."""
     return [
         case
-        for case in parameters.cases
+        for case in CASES
         if parameters.cases[case].track == "fixed"
         and (every or BASELINE in methods_of(case))
     ]
@@ -24,7 +29,7 @@ def checked_cases(every: bool) -> list[str]:
 
 def named_cases(names: tuple[str, ...]) -> list[str]:
     """Those of some cases that there are."""
-    return [case for case in names if case in parameters.cases]
+    return [case for case in names if case in CASES]
 
 
 CONTROL_CASES = [

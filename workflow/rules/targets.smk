@@ -3,7 +3,7 @@
 
 GAIN_CASES = named_cases(parameters.figures.by_gain)
 VARIATION_CASES = named_cases(parameters.figures.by_variation)
-TRACK_CASES = [case for case in parameters.cases if parameters.cases[case].track == "random"]
+TRACK_CASES = [case for case in CASES if parameters.cases[case].track == "random"]
 
 
 def judged(case: str) -> bool:
@@ -43,7 +43,7 @@ def on_tracks(case: str) -> bool:
     """Whether the case exists and its track is drawn, so that there can be others."""
     track = parameters.irregularity
     drawn = track.enabled and track.profile_file is None
-    return case in parameters.cases and case not in TRACK_CASES and drawn
+    return case in CASES and case not in TRACK_CASES and drawn
 
 
 def of_line() -> list[str]:
@@ -76,11 +76,11 @@ def results() -> list[str]:
         if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
             files.append(file_of(name))
         if wildcards == {"case"}:
-            cases = [case for case in parameters.cases if possible(stage, case)]
+            cases = [case for case in CASES if possible(stage, case)]
             files += [file_of(name, case=case) for case in cases]
         if wildcards == {"case", "method"}:
             files += [
-                file for case in parameters.cases for file in of_methods(name, case)
+                file for case in CASES for file in of_methods(name, case)
             ]
     return files
 
