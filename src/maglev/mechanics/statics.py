@@ -21,14 +21,14 @@ def deflection(guideway: GuidewayModel, train: TrainModel, nose: npt.ArrayLike) 
     """Vertical deflection at midspan of the middle span under the suspension magnets at rest.
 
     The poles' static forces stand on both rails; by reciprocity one solution under a unit load at
-    midspan gives the influence of a load at every place.
+    midspan gives the influence of a load at every point.
 
     Parameters
     ----------
     guideway, train
         The models.
     nose : (...)
-        Places of the train's nose [m].
+        Positions of the train's nose [m].
 
     Returns
     -------
@@ -53,14 +53,14 @@ def deflection(guideway: GuidewayModel, train: TrainModel, nose: npt.ArrayLike) 
 
 
 def largest_deflection(guideway: GuidewayModel, train: TrainModel, step: float = 0.5) -> float:
-    """Largest `deflection` [m] over all places of the train.
+    """Largest `deflection` [m] over all positions of the train.
 
     Parameters
     ----------
     guideway, train
         The models.
     step
-        Distance of neighbouring places of the nose [m]; at 0.5 m a parabola over one span of
+        Distance between positions of the nose [m]; at 0.5 m a parabola over one span of
         25 m misses its top by less than 2e-4 of it.
     """
     length = guideway.parameters.length + train.parameters.length
