@@ -350,12 +350,24 @@ def _chosen(whole: Mapping[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
 
 
 def flag(name: str) -> str:
-    """An option as it stands on the command line, such as ``--threads`` for ``n_threads``."""
+    """An option as it stands on the command line, such as ``--threads`` for ``n_threads``.
+
+    Examples
+    --------
+    >>> flag("n_threads")
+    '--threads'
+    """
     return f"--{name.removeprefix('n_').replace('_', '-')}"
 
 
 def summary(name: str) -> str | None:
-    """First sentence of the module of a stage, read without importing it; None if there is none."""
+    """First sentence of the module of a stage, read without importing it; None if there is none.
+
+    Examples
+    --------
+    >>> summary("passage")
+    'One passage at the mean gains, with its histories.'
+    """
     path = _FOLDER / f"{name}.py"
     tree = ast.parse(path.read_text(encoding="utf-8")) if path.is_file() else ast.Module([], [])
     targets = [each for node in tree.body if isinstance(node, ast.Assign) for each in node.targets]
@@ -365,17 +377,35 @@ def summary(name: str) -> str | None:
 
 
 def summaries() -> dict[str, str]:
-    """Summary of each stage by its name."""
+    """Summary of each stage by its name.
+
+    Examples
+    --------
+    >>> "passage" in summaries()
+    True
+    """
     found = {path.stem: summary(path.stem) for path in sorted(_FOLDER.glob("*.py"))}
     return {name: words for name, words in found.items() if words is not None}
 
 
 def named(name: str) -> Stage:
-    """The stage of a name."""
+    """The stage of a name.
+
+    Examples
+    --------
+    >>> named("passage").layout
+    'passage'
+    """
     stage: Stage = import_module(f"maglev.stages.{name}").STAGE
     return stage
 
 
 def stages() -> dict[str, Stage]:
-    """All stages by their names; imports every module of a stage."""
+    """All stages by their names; imports every module of a stage.
+
+    Examples
+    --------
+    >>> stages().keys() == summaries().keys()
+    True
+    """
     return {name: named(name) for name in summaries()}

@@ -72,7 +72,13 @@ class Link:
 
 
 def relative(first: Motion, second: Motion) -> Motion:
-    """Relative motion ``first - second``, such as that of a magnet's end against its C-frame."""
+    """Relative motion ``first - second``, such as that of a magnet's end against its C-frame.
+
+    Examples
+    --------
+    >>> relative({0: 1.0, 2: 0.5}, {0: 1.0, 1: 1.0})  # what both share drops out
+    {2: 0.5, 1: -1.0}
+    """
     return _combination(*first.items(), *((dof, -value) for dof, value in second.items()))
 
 
@@ -90,6 +96,12 @@ def link_rows(links: Iterable[Link], n_dof: int) -> sp.csr_array:
     -------
     rows : (link, dof)
         Stretch [m] or twist [rad] per displacement [m] or rotation [rad].
+
+    Examples
+    --------
+    >>> spring = Link({0: 1.0, 1: -1.0}, stiffness=2.0, damping=0.0)
+    >>> link_rows([spring], n_dof=3).toarray()
+    array([[ 1., -1.,  0.]])
     """
     motions = [link.motion for link in links]
     row = np.repeat(np.arange(len(motions)), [len(motion) for motion in motions])
@@ -112,6 +124,13 @@ def assembled(rows: sp.csr_array, coefficient: FloatArray) -> sp.csr_array:
     -------
     matrix : (dof, dof)
         Stiffness or damping matrix; its pattern holds no explicit zeros.
+
+    Examples
+    --------
+    >>> spring = Link({0: 1.0, 1: -1.0}, stiffness=2.0, damping=0.0)
+    >>> assembled(link_rows([spring], n_dof=2), [spring.stiffness]).toarray()
+    array([[ 2., -2.],
+           [-2.,  2.]])
     """
     matrix = sp.csr_array(rows.T @ sp.diags_array(coefficient) @ rows)
     matrix.eliminate_zeros()

@@ -255,6 +255,12 @@ def build(guideway: Guideway) -> GuidewayModel:
     -------
     model
         Degrees of freedom in the order pier, span, pier, …; each span's sorted along x.
+
+    Examples
+    --------
+    >>> model = build(Guideway(n_spans=1))
+    >>> model.pier_top_dof.shape  # two piers
+    (2, 6)
     """
     span, pier_mass, pier_stiffness, pier_depth = _span(guideway), *_pier(guideway)
     n_pier, n_span, n_spans = pier_mass.shape[0], span.mass.shape[0], guideway.n_spans
@@ -331,6 +337,12 @@ def modes(model: GuidewayModel, cutoff_hz: float) -> tuple[FloatArray, FloatArra
     References
     ----------
     Parlett, The Symmetric Eigenvalue Problem (1998), ch. 3 and 13.
+
+    Examples
+    --------
+    >>> frequency, shape = modes(build(Guideway(n_spans=1)), 20.0)
+    >>> bool(frequency.size > 0 and frequency[-1] <= 20.0)
+    True
     """
     if not cutoff_hz > 0:
         raise UserError(f"cutoff_hz must be positive, got {cutoff_hz} Hz")
@@ -388,6 +400,12 @@ def damping(model: GuidewayModel, ratio: float, cutoff_hz: float) -> ModalDampin
     References
     ----------
     Wilson and Penzien, Int. J. Numer. Methods Eng. 4 (1972) 5-10.
+
+    Examples
+    --------
+    >>> found = damping(build(Guideway(n_spans=1)), 0.02, 20.0)
+    >>> bool((found.coefficient <= 0.0).all())
+    True
     """
     if not 0 <= ratio < 1:
         raise UserError(f"damping ratio must lie in [0, 1), got {ratio}")
@@ -560,6 +578,11 @@ def rectangle_torsion_constant(width: float, depth: float) -> float:
     References
     ----------
     Timoshenko and Goodier, Theory of Elasticity (1970), sec. 109.
+
+    Examples
+    --------
+    >>> round(rectangle_torsion_constant(1.0, 1.0), 4)
+    0.1406
     """
     if not (width > 0 and depth > 0):
         raise UserError(f"sides must be positive, got {width} m and {depth} m")

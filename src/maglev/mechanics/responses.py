@@ -84,6 +84,11 @@ def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4)
     ------
     UserError
         If they have another shape, no sample, or a value that is not finite.
+
+    Examples
+    --------
+    >>> checked_gains([[3500.0, 17.5, 4500.0, 17.5]]).shape
+    (1, 8)
     """
     array = np.asarray(gains, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] not in (4, 8):
@@ -134,6 +139,11 @@ def acceleration_filter(passage: Passage, time_step: float) -> FloatArray:
     References
     ----------
     docs/theory/integration.md, eq. 8.
+
+    Examples
+    --------
+    >>> acceleration_filter(Passage(), 0.5e-3).shape  # eighth order
+    (4, 6)
     """
     band = passage.acceleration_band
     if band is None:
