@@ -44,10 +44,10 @@ SOURCES = {
     "D": "derived from the other sources",
     "A": "assumed",
 }
-"""What the source letters in the parameter tables stand for."""
+"""Meaning of the source letters in the parameter tables."""
 
 CONFIDENCE = {"H": "high", "M": "medium", "L": "low"}
-"""How far a value can be trusted."""
+"""Meaning of the letters of confidence."""
 
 
 def quantity(
@@ -68,7 +68,7 @@ def quantity(
     unit
         SI unit of the stored number, in the notation of pint; ``""`` for a pure number.
     meaning
-        What the number is, with its symbol.
+        Meaning of the number, with its symbol.
     default
         Value in ``unit``, or a text with its own unit such as ``"430 km/h"``.
     source
@@ -279,7 +279,7 @@ class Magnet(Parameters):
     """A row of poles on one rigid magnet body, its suspension on the C-frames and its currents.
 
     The magnet hangs with both ends on neighbouring C-frames.  The gap of a pole is the mean over
-    its face, and so is its force on the rail.  Which poles share a circuit says ``control``.
+    its face, and so is its force on the rail.  ``control`` says which poles share a circuit.
     """
 
     mass: float = quantity("kg", "mass", 600, source="H", confidence="M", above=0)
@@ -336,7 +336,7 @@ class Magnet(Parameters):
     )
     preload: float | None = quantity(
         "N",
-        "force at rest; null: what the magnet carries of the train's weight",
+        "force at rest; null: the magnet's part of the train's weight",
         None,
         source="A",
         confidence="L",
@@ -704,7 +704,7 @@ class Irregularity(Parameters):
     )
     fade_in: float = quantity(
         "m",
-        "length before the guideway over which the irregularity grows from nothing",
+        "length before the guideway over which the irregularity grows from zero",
         50,
         source="A",
         confidence="L",
@@ -805,18 +805,19 @@ class Circuit(Parameters):
 
     ``pole``: every pole has a circuit of its own, fed by its own gap.  ``ends``: two a magnet, each
     fed by the gap at the outermost pole of its half.  ``half``: two a magnet, each fed by the mean
-    gap of its half.  ``lumped``: one a magnet, fed by the mean gap, which its force goes by too.
+    gap of its half.  ``lumped``: one a magnet, fed by the mean gap, from which its forces follow
+    too.
     """
 
     group: Group = Field(
         "pole",
-        description="who shares a circuit: each pole its own, each half fed at the magnet's end "
+        description="sharing of circuits: each pole its own, each half fed at the magnet's end "
         "(ends), each half fed by its mean gap (half), a magnet with one force (lumped)",
         json_schema_extra={"source": "A", "confidence": "L"},
     )
     lag: float = quantity(
         "s",
-        "time constant with which the current follows its command",
+        "time constant of the lag of the current behind its command",
         "0 ms",
         source="A",
         confidence="L",
@@ -998,7 +999,7 @@ class TailDesign(Parameters):
     n_candidates: int = _count(16_384, "Sobol' points that rounds choose from", minimum=8)
     batch_size: int = _count(8, "runs of one round")
     aggregate: Literal["sum", "maximum"] = Field(
-        "sum", description="how the gains of several limits become one score"
+        "sum", description="combination of the gains of several limits to one score"
     )
     threshold: float = Field(
         0.02,
@@ -1433,7 +1434,7 @@ def _with_numbers(section: Parameters, nested: Mapping[str, Any], place: str) ->
 BORDER_OF_HALF = {"suspension": 1.246, "guidance": 1.396}
 """Least stable k_p over i0/delta0 where circuits are fed by the mean gap of their half: of one
 linearised car with the default masses and springs (docs/theory/control.md); of the other groups it
-is 1.  Another train has others, so that they serve for a first check only."""
+is 1.  Another train has other values; these serve for a first check only."""
 
 
 RAW_CUTOFF, RAW_STEP = 2000.0, 0.06e-3
@@ -1522,12 +1523,12 @@ class Config(Parameters):
         values
             Such as ``{"passage.speed": "500 km/h"}``.
         prefix
-            What the keys belong to, for messages.
+            Text before each key in messages.
 
         Raises
         ------
         UserError
-            If a key is none of a case's, or its value will not do.
+            If a case cannot set the key, or the value is refused.
         """
         changed = self
         for dotted, value in values.items():

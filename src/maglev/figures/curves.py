@@ -30,7 +30,7 @@ def named(data: Sequence[xr.Dataset]) -> xr.DataArray:
 def densities(data: Sequence[xr.Dataset]) -> xr.Dataset:
     """Put files of the layout ``density`` side by side along ``curve``.
 
-    A density is that of the GDEE, where there is none the direct one with its band.
+    A density is that of the GDEE, or the direct one with its band where there is none.
     """
     columns: dict[str, list[FloatArray]] = {}
 
@@ -111,8 +111,8 @@ def body(curves: xr.Dataset, response: int, tail: float) -> tuple[float, float]:
 def draw_densities(axis: Axes, curves: xr.Dataset, response: int, styles: Sequence[Look]) -> None:
     """Draw the densities of a response, each with its band if it has one.
 
-    Curves that tower over the widest ones run out of the panel; their peaks are then written, in
-    their colours, into its upper right corner.
+    Curves far higher than the widest ones leave the panel; their peaks are then written, in their
+    colours, into its upper right corner.
     """
     shown = labels.SHOWN[response]
     at = curves.isel(response=response)
@@ -150,15 +150,15 @@ def draw_limits(axis: Axes, x: FloatArray, at: xr.Dataset, look: Look) -> None:
     """Draw limits and their intervals against another quantity.
 
     The line and hollow markers are the limits given that levitation holds, filled markers those of
-    all passages: there are none where losses alone are likelier than the failure probability.  An
-    arrow stands for an interval without an upper end.
+    all passages, missing where losses alone are likelier than the failure probability.  An arrow
+    stands for an interval without an upper end.
 
     Parameters
     ----------
     axis
         Where to draw.
     x : (point,)
-        Places.
+        Abscissae.
     at
         ``curve_limit`` and ``curve_held_limit`` with their ends, on one dimension (point,), in
         the unit of the axis.

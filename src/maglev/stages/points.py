@@ -171,7 +171,7 @@ def baseline(config: Config, case: str, n: int, stream: str = "baseline") -> Flo
 
 
 def track_seeds(config: Config, n: int, stream: str = "track") -> IntArray:
-    """Seeds (sample,) of the irregularities that the samples meet; seed i does not depend on n."""
+    """Seeds (sample,) of the irregularity of each sample; seed i does not depend on ``n``."""
     return generator(config.seed, stream).integers(0, 2**31, size=n)
 
 
@@ -212,7 +212,7 @@ def dataset(config: Config, case: str, points: PointSet) -> xr.Dataset:
     case
         Name of the case.
     points
-        In the random gains of the case.
+        Points of the random gains of the case.
     """
     values = values_at(config, case, points.standard)
     gains = gains_at(config, case, values)
@@ -244,7 +244,7 @@ def gf_set(config: Config, case: str, n: int, key: str) -> PointSet:
     n
         Number of points.
     key
-        What the random numbers belong to.
+        Purpose of the random numbers, see `maglev.stages.randomness.generator`.
 
     References
     ----------

@@ -14,16 +14,16 @@ RUNS_OF_CASE = (*TRAIN_ON_GUIDEWAY, "gains", *OF_CASE)
 """What the runs of a case depend on."""
 
 MEASURED = ("validation.measurements", "validation.measured_here")
-"""Whether and where there are measurements of the bridge."""
+"""Keys of the measurements on the guideway."""
 
 N_SAMPLES = ("study.mcm.n_samples", "cases.{case}.n_samples")
-"""What the size of a baseline depends on."""
+"""Keys that decide the size of a baseline."""
 
 RANDOM_QUANTITIES = RUNS_OF_CASE
 """What points of a case are drawn by: any number may be the mean of one that is random."""
 
 PREDICTING = ("seed", "study.confidence", "study.n_population")
-"""What a predictor is made with, beside the kind of its surrogate."""
+"""Keys of a predictor, without the kind of its surrogate."""
 
 SURROGATE_OF_METHODS = tuple(f"study.{method}.surrogate" for method in DESIGNED)
 """The kind of surrogate of every method."""

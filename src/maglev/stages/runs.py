@@ -38,8 +38,8 @@ _FILES = threading.Lock()
 """Held while a file is open: the NetCDF library serves one thread at a time."""
 
 BATCH = 32
-"""Runs computed and stored together, whole rows of samples of the production solver: what a kill
-loses at most."""
+"""Runs computed and stored together, whole rows of samples of the production solver; an
+interruption costs at most as many."""
 
 
 @cache
