@@ -55,6 +55,8 @@ def of_line() -> list[str]:
 
 def possible(stage, case: str) -> bool:
     """Whether a case has what a stage of it needs: methods, and a random track for its parts."""
+    if stage.name == "paper_and_ours" and RESPONSE not in parameters.responses_of_study:
+        return False
     of_track = "track_runs" in (stage.name, *stage.inputs)
     if "tracks" in (stage.name, *stage.inputs) and not on_tracks(case):
         return False
@@ -72,6 +74,8 @@ def results() -> list[str]:
     for name, stage in STAGES.items():
         wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
         if name == "control_study" and not CONTROL_CASES:
+            continue
+        if name == "limit_state_table" and not parameters.cases:
             continue
         if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
             files.append(place(name))
@@ -91,4 +95,8 @@ def figures_of_study() -> list[str]:
         f"<results>/figures/{name}.png"
         for name, (_, _, files) in DRAWN.items()
         if files
+    ] + [
+        f"<results>/figures/{case}/{name}.png"
+        for name in OF_CASE
+        for case in parameters.cases
     ]

@@ -18,7 +18,7 @@ from maglev.parameters import Case, Config
 from maglev.stages.randomness import generator
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import PointSet, gf_points
-from maglev.vocabulary import GAINS
+from maglev.vocabulary import GAIN_KEYS, GAINS
 
 
 def case_of(config: Config, name: str) -> Case:
@@ -37,6 +37,17 @@ def case_of(config: Config, name: str) -> Case:
 def random_columns(case: Case) -> IntArray:
     """Columns (parameter,) of the random gains in an array of all four, in rising order."""
     return np.flatnonzero([name.removesuffix("_gain") in case.random_gains for name in GAINS])
+
+
+def parameters(config: Config, case: str) -> tuple[str, ...]:
+    """Dotted keys of the configuration that are random in a case, in the order of the columns.
+
+    Examples
+    --------
+    >>> parameters(Config(), "only_suspension_derivative")
+    ('gains.suspension_derivative',)
+    """
+    return tuple(f"gains.{GAIN_KEYS[k]}" for k in random_columns(case_of(config, case)))
 
 
 def marginals(config: Config, case: str) -> Marginals:
@@ -130,7 +141,7 @@ def dataset(config: Config, case: str, points: PointSet) -> xr.Dataset:
         },
         coords={
             "sample": np.arange(points.standard.shape[0]),
-            "parameter": random_columns(case_of(config, case)).astype(np.int8),
+            "parameter": list(parameters(config, case)),
         },
     )
 

@@ -28,7 +28,7 @@ from maglev.errors import UserError
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
 from maglev.simulation import simulate
-from maglev.stages.points import case_of, gains_at, random_columns
+from maglev.stages.points import gains_at, parameters
 from maglev.stages.reads import TRAIN_ON_GUIDEWAY
 from maglev.vocabulary import GAINS, STEP_TOO_LARGE
 
@@ -267,4 +267,4 @@ def runs(
     )
     return passages.assign(
         standard=(("sample", "parameter"), standard), probability=(("sample",), probability)
-    ).assign_coords(parameter=random_columns(case_of(config, case)).astype(np.int8))
+    ).assign_coords(parameter=list(parameters(config, case)))
