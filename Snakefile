@@ -15,6 +15,7 @@ from maglev.config import (
 )
 from maglev.fingerprint import code_of
 from maglev.stage import flag, stages, summaries
+from maglev.stages.paper_and_ours import RESPONSE
 from maglev.stages.points import n_samples
 from maglev.vocabulary import BASELINE, DESIGNED, METHODS, TRACK_PARTS
 

@@ -78,7 +78,8 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
 def overlay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Lay one nested mapping over another, key by key; neither is changed.
 
-    A spectrum of another law replaces the one below it as a whole.
+    A spectrum of another law replaces the one below it as a whole, and so does a limit state that
+    says all of itself: a response with its limit, or what it joins.
 
     Examples
     --------
@@ -90,10 +91,16 @@ def overlay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         below = merged.get(key)
         if isinstance(below, Mapping) and isinstance(value, Mapping):
             same_law = value.get("law", below.get("law")) == below.get("law")
-            merged[key] = overlay(below, value) if same_law else dict(value)
+            whole = not same_law or _is_limit_state(value)
+            merged[key] = dict(value) if whole else overlay(below, value)
         else:
             merged[key] = value
     return merged
+
+
+def _is_limit_state(value: Mapping[str, Any]) -> bool:
+    """Whether keys and values say all of a limit state."""
+    return {"response", "limit"} <= set(value) or bool({"any_of", "all_of"} & set(value))
 
 
 def _file_keys(model: type[Parameters], path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:

@@ -28,7 +28,19 @@ from pydantic.fields import FieldInfo
 from maglev import laws
 from maglev.errors import UserError
 from maglev.units import in_unit
-from maglev.vocabulary import GAIN_KEYS, GROUPS, Gain, Group, Method, Response, Surrogate
+from maglev.vocabulary import (
+    GAIN_KEYS,
+    GROUPS,
+    LOST,
+    PAPER_RESPONSES,
+    RESPONSE_UNITS,
+    RESPONSES,
+    Gain,
+    Group,
+    Method,
+    Response,
+    Surrogate,
+)
 
 GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
 
@@ -1009,6 +1021,12 @@ class TailDesign(Parameters):
     )
     n_rounds: int = _count(3, "rounds in a row in which the limits must be settled to stop")
     n_largest: int = _count(104, "largest number of runs", minimum=8)
+    responses: tuple[Response, ...] | None = Field(
+        None,
+        description="responses whose limits drive; null: study.responses and those of the limit "
+        "states that drive",
+        min_length=1,
+    )
     surrogate: SurrogateKind = Field("best", description="surrogate of the finished design")
 
 
@@ -1040,6 +1058,11 @@ class Study(Parameters):
         description="probabilities of exceedance whose limits are given, from large to small",
         min_length=1,
     )
+    responses: tuple[Response, ...] = Field(
+        PAPER_RESPONSES,
+        description="responses that are predicted, beside those of the limit states",
+        min_length=1,
+    )
     confidence: float = Field(
         0.95, description="probability that an interval covers the truth", gt=0, lt=1
     )
@@ -1061,6 +1084,9 @@ class Study(Parameters):
         levels = self.failure_probability
         if not all(0 < level < 1 for level in levels):
             raise ValueError(f"failure_probability must lie between 0 and 1, got {list(levels)}")
+        for key, names in (("responses", self.responses), ("asm.responses", self.asm.responses)):
+            if names is not None and len(set(names)) < len(names):
+                raise ValueError(f"{key} must not name anything twice, got {', '.join(names)}")
         if any(high <= low for high, low in pairwise(levels)):
             raise ValueError(
                 f"failure_probability must fall from value to value, got {list(levels)}"
@@ -1080,6 +1106,182 @@ class Study(Parameters):
                     f"got {design.n_largest}"
                 )
         return self
+
+
+def _pint_unit(unit: str) -> str:
+    """A unit of a response in the notation of the configuration, such as ``m/s^2``."""
+    return {"1": "", "m s-2": "m/s^2"}.get(unit, unit)
+
+
+class LimitState(Parameters):
+    """One limit state: a response and its limit, or several limit states together.
+
+    A passage that loses levitation exceeds every one.
+    """
+
+    response: Response | None = Field(None, description="response that must not exceed the limit")
+    limit: str | float | None = Field(
+        None,
+        description="largest value that the response may have, with a unit of the response; "
+        "a plain number where it has none",
+    )
+    any_of: tuple[str, ...] = Field(
+        (), description="limit states of which one is enough, by name; lost: levitation is lost"
+    )
+    all_of: tuple[str, ...] = Field((), description="limit states that must all be exceeded")
+    target: float | None = Field(
+        None, description="probability that it may have in a passage", gt=0, lt=1
+    )
+    drives: bool = Field(
+        True,
+        description="whether adaptive designs choose runs for its response, or those of its parts",
+    )
+    source: str = Field("", description="where limit and target come from")
+    confidence: Literal["high", "medium", "low"] | None = Field(
+        None, description="how far the limit can be trusted"
+    )
+
+    @property
+    def threshold(self) -> float:
+        """The limit in the SI unit of the response; NaN where there is none."""
+        if self.response is None or self.limit is None:
+            return math.nan
+        if isinstance(self.limit, str):
+            return in_unit(self.limit, _pint_unit(RESPONSE_UNITS[self.response]), "limit")
+        return self.limit
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the limit states that it joins."""
+        return (*self.any_of, *self.all_of)
+
+    @property
+    def definition(self) -> str:
+        """What it says, in words."""
+        if self.response is not None:
+            return f"{self.response} > {self.limit}"
+        return f"{'any' if self.any_of else 'all'} of: {', '.join(self.parts)}"
+
+    @property
+    def origin(self) -> str:
+        """Source of limit and target, and confidence; empty if none is stated."""
+        confidence = f"confidence: {self.confidence}" if self.confidence else ""
+        return "; ".join(filter(None, (self.source, confidence)))
+
+    @model_validator(mode="after")
+    def _check(self) -> LimitState:
+        kinds = [
+            key for key in ("response", "any_of", "all_of") if getattr(self, key) not in (None, ())
+        ]
+        if len(kinds) != 1:
+            raise ValueError(
+                "must have exactly one of: response with its limit, any_of, all_of; got "
+                f"{' and '.join(kinds) or 'none'}"
+            )
+        if len(set(self.parts)) < len(self.parts):
+            raise ValueError(
+                f"{kinds[0]} must not name anything twice, got {', '.join(self.parts)}"
+            )
+        if (self.response is None) != (self.limit is None):
+            missing = "limit" if self.limit is None else "response"
+            raise ValueError(f"{missing} is missing: a response needs a limit, a limit a response")
+        if self.response is not None:
+            self._check_limit(RESPONSE_UNITS[self.response])
+        return self
+
+    def _check_limit(self, unit: str) -> None:
+        """Refuse a limit of another unit than the response's, or one that is not positive."""
+        shown = _pint_unit(unit)
+        if isinstance(self.limit, str) and not shown:
+            raise ValueError(
+                f"limit must be a plain number, as {self.response} has no unit, got {self.limit!r}"
+            )
+        if not isinstance(self.limit, str) and shown:
+            raise ValueError(f"limit must carry its unit, such as '{self.limit:g} {shown}'")
+        if not 0 < self.threshold < math.inf:
+            raise ValueError(f"limit must be greater than 0 and finite, got {self.limit!r}")
+
+
+ONCE_A_YEAR = 2.74e-5
+"""Probability per passage of once a year with 36,500 trains, a hundred a day; assumed."""
+
+
+def _limit_states() -> dict[str, LimitState]:
+    """The limit states that are shipped: those whose response there is."""
+    once = f"; target: once a year with 36,500 trains, assumed ({ONCE_A_YEAR:g} a passage)"
+    shipped: tuple[tuple[str, str, str | float, str, str], ...] = (
+        (
+            "suspension gap",
+            "suspension_gap_excursion",
+            "4 mm",
+            "customary for a gap of 8 to 10 mm, recalled; assumed here",
+            "medium",
+        ),
+        (
+            "guidance gap",
+            "guidance_gap_excursion",
+            "4 mm",
+            "as the suspension gap; assumed",
+            "low",
+        ),
+        (
+            "ride",
+            "car_body_acceleration_z",
+            "1.0 m/s^2",
+            "EN 1990:2002/A1, table A2.9, very good comfort, recalled",
+            "medium",
+        ),
+        (
+            "Sperling, vertical",
+            "sperling_index_z",
+            2.5,
+            "GB/T 5599, excellent up to 2.5",
+            "high",
+        ),
+        (
+            "Sperling, lateral",
+            "sperling_index_y",
+            2.5,
+            "GB/T 5599, excellent up to 2.5",
+            "high",
+        ),
+        (
+            "ISO 2631, vertical",
+            "iso2631_rms_z",
+            "0.315 m/s^2",
+            "ISO 2631-1:1997, annex C, not uncomfortable below",
+            "high",
+        ),
+        (
+            "ISO 2631, lateral",
+            "iso2631_rms_y",
+            "0.315 m/s^2",
+            "ISO 2631-1:1997, annex C, not uncomfortable below",
+            "high",
+        ),
+        (
+            "deflection",
+            "deflection_over_span",
+            1 / 4000,
+            "L/4000, customary for high-speed guideways, recalled; assumed here",
+            "low",
+        ),
+        ("dynamic factor", "dynamic_coefficient", 1.2, "assumed", "low"),
+    )
+    return {
+        name: LimitState.model_validate(
+            {
+                "response": response,
+                "limit": limit,
+                "target": ONCE_A_YEAR,
+                "drives": False,
+                "source": f"{source}{once}",
+                "confidence": confidence,
+            }
+        )
+        for name, response, limit, source, confidence in shipped
+        if response in RESPONSES
+    }
 
 
 _RESERVED = ("config", "track", "guideway", "train", "figures", "tables", "checks", "report")
@@ -1466,6 +1668,12 @@ class Config(Parameters):
     only: tuple[str, ...] | None = Field(
         None, description="names of the cases that are run, in their order; null: all"
     )
+    limit_states: Mapping[str, LimitState] = Field(
+        _limit_states(),
+        description="the limit states by name; lost, levitation is lost, is always there; null "
+        "removes one that a file below names",
+        json_schema_extra={"names": r"^\S(.*\S)?$"},
+    )
     cases: Mapping[str, Case] = Field(
         _cases(),
         description="the cases by name; null removes a case that a file below names",
@@ -1483,8 +1691,10 @@ class Config(Parameters):
     def quantities(self) -> dict[str, Any]:
         """Return the class as the configuration file would write it, units included."""
         whole = super().quantities()
-        removed: dict[str, Any] = {name: None for name in _cases() if name not in self.cases}
-        return {**whole, "cases": {**whole["cases"], **removed}}
+        for key, shipped in (("limit_states", _limit_states()), ("cases", _cases())):
+            kept = getattr(self, key)
+            whole[key] |= {name: None for name in shipped if name not in kept}
+        return whole
 
     @model_validator(mode="before")
     @classmethod
@@ -1514,6 +1724,86 @@ class Config(Parameters):
                     f"none of {', '.join(_RESERVED)}"
                 )
         return {name: case for name, case in cases.items() if case is not None}
+
+    @field_validator("limit_states", mode="before")
+    @classmethod
+    def _drop_removed_states(cls, states: Any) -> Any:
+        if not isinstance(states, Mapping):
+            return states
+        for name in states:
+            if not re.fullmatch(r"\S(.*\S)?", str(name)) or name == LOST:
+                raise ValueError(
+                    f"{name} cannot name a limit state: use a line of text that neither begins nor "
+                    f"ends with a space; {LOST} is always there and means lost levitation"
+                )
+        return {name: state for name, state in states.items() if state is not None}
+
+    @model_validator(mode="after")
+    def _check_limit_states(self) -> Config:
+        known = (*self.limit_states, LOST)
+        for name, state in self.limit_states.items():
+            key = "any_of" if state.any_of else "all_of"
+            for part in state.parts:
+                if part not in known:
+                    raise ValueError(
+                        f"limit_states.{name}.{key} names no limit state: there is no '{part}', "
+                        f"known are: {', '.join(known)}"
+                    )
+        for name in self.limit_states:
+            self._responses_of_state(name)
+        return self
+
+    def _responses_of_state(self, name: str, above: tuple[str, ...] = ()) -> tuple[Response, ...]:
+        """Responses that a limit state and the parts of it limit.
+
+        Raises
+        ------
+        ValueError
+            If it contains itself.
+        """
+        if name in above:
+            circle = " -> ".join((*above[above.index(name) :], name))
+            raise ValueError(f"limit_states.{above[0]} goes in a circle: {circle}")
+        if name == LOST:
+            return ()
+        state = self.limit_states[name]
+        own = () if state.response is None else (state.response,)
+        within = (*above, name)
+        return own + tuple(
+            one for part in state.parts for one in self._responses_of_state(part, within)
+        )
+
+    @property
+    def responses_of_study(self) -> tuple[Response, ...]:
+        """Responses that are predicted: those of the study, then those of the limit states.
+
+        Examples
+        --------
+        >>> Config().responses_of_study[0]
+        'girder_displacement_z'
+        """
+        of_states = (one for name in self.limit_states for one in self._responses_of_state(name))
+        return tuple(dict.fromkeys((*self.study.responses, *of_states)))
+
+    @property
+    def responses_of_designs(self) -> tuple[Response, ...]:
+        """Responses that drive adaptive designs, and that every design reports on."""
+        chosen = self.study.asm.responses
+        if chosen is None:
+            driving = (
+                one
+                for name, state in self.limit_states.items()
+                if state.drives
+                for one in self._responses_of_state(name)
+            )
+            chosen = (*self.study.responses, *driving)
+        return tuple(dict.fromkeys(chosen))
+
+    def with_responses(self) -> Config:
+        """Return the configuration whose study names all responses, its limit states' included."""
+        asm = self.study.asm.model_copy(update={"responses": self.responses_of_designs})
+        study = self.study.model_copy(update={"responses": self.responses_of_study, "asm": asm})
+        return self.model_copy(update={"study": study})
 
     def with_values(self, values: Mapping[str, Any], prefix: str = "") -> Config:
         """Return the configuration with other values at dotted keys, written as in a file.

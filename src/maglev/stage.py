@@ -21,7 +21,7 @@ from maglev.config import named_files
 from maglev.errors import UserError
 from maglev.fingerprint import code_of, file_hash
 from maglev.parameters import Config, Parameters
-from maglev.vocabulary import BASELINE, METHODS, Method
+from maglev.vocabulary import BASELINE, METHODS, Method, Response
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -156,13 +156,16 @@ class Stage:
         -------
         part
             Of a stage that reads its case: without the other cases, the case's own values in their
-            sections and the guideway with its spans; its methods are the one method.
+            sections and the guideway with its spans; its methods are the one method.  Of a stage
+            that reads responses of the study: those of the limit states among them.
         """
         keys = self.keys(case, method)
         if case is not None and self.reads_of != "run":
             config = config.with_case_set(case)
-        whole = config.quantities()
+        whole = config.with_responses().quantities()
         part = _chosen(whole, keys)
+        if "study" in part and "limit_states" not in part:  # their responses are in the study
+            part["limit_states"] = dict.fromkeys(whole["limit_states"])
         if self.reads_of != "run":
             assert case is not None  # keys has asked for it
             own = {"methods": [method or BASELINE], **part.get("cases", {}).get(case, {})}
@@ -193,6 +196,7 @@ class Stage:
             raise UserError(f"there is no case '{case}', known are: {', '.join(config.cases)}")
         if case is not None and self.reads_of != "run":
             config = config.with_case_set(case)
+        config = config.with_responses()
         hashes = {name: file_hash(path) for name, path in self.files(config, case, method).items()}
         keys = self.keys(case, method)
         return cast(Config, View(self.name, config, keys, files=tuple(sorted(hashes.items()))))
@@ -333,6 +337,22 @@ class View:
     def with_case_set(self, _name: str) -> View:
         """The view itself, in whose sections a case's own values already are."""
         return self
+
+    def with_responses(self) -> View:
+        """The view itself: its study has named all responses since it was made."""
+        return self
+
+    @property
+    def responses_of_study(self) -> tuple[Response, ...]:
+        """Responses that are predicted, as the study of the view names them."""
+        found: tuple[Response, ...] = self.study.responses
+        return found
+
+    @property
+    def responses_of_designs(self) -> tuple[Response, ...]:
+        """Responses that drive adaptive designs, likewise."""
+        found: tuple[Response, ...] = self.study.asm.responses
+        return found
 
     def quantities(self) -> dict[str, Any]:
         """Readable values in the form of a configuration file, units included."""

@@ -20,7 +20,17 @@ Response = Literal[
 """A response; its extreme is the result of a passage."""
 
 RESPONSES: tuple[Response, ...] = get_args(Response)
-"""The responses in the order of ``response`` in files and arrays."""
+"""The responses in the order in which they are shown."""
+
+PAPER_RESPONSES: tuple[Response, ...] = (
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+    "car_body_acceleration_z",
+    "car_body_acceleration_y",
+)
+"""The responses that the paper judges a passage by."""
 
 _GIRDER = "of the girder at midspan of the middle span"
 _CAR = "of the car body, largest over the cars"
@@ -123,6 +133,9 @@ fine a mesh; direct, where there is no GDEE or it refused both."""
 
 SOURCES = ("paper", "ours")
 """Source of a number."""
+
+LOST = "lost"
+"""The limit state that is always there: levitation is lost."""
 
 TRACK_PARTS = ("gains_only", "track_only", "other_track", "other_gains")
 """Further runs of a case whose baseline has gains i on track i: gains i on the configured track;

@@ -18,6 +18,7 @@ import synthetic
 
 from maglev.config import from_mapping
 from maglev.datasets import VARIABLES, describe
+from maglev.parameters import Config
 from maglev.stages import (
     baseline,
     baseline_chunk,
@@ -42,6 +43,7 @@ MAPPING = {
         "moving": {"methods": ["mcm"], "track": "random", "n_samples": 6},
         "same": {"methods": ["asm"]},
     },
+    "limit_states": dict.fromkeys(Config().limit_states),
 }
 
 

@@ -82,6 +82,12 @@ def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str,
                 else methods_of(one, (BASELINE,))
             )
         ]
+    if stage.name == "limit_state_table":
+        return [
+            {"case": one, "method": method}
+            for one in parameters.cases
+            for method in methods_of(one)
+        ]
     return {
         ("method",): lambda: [
             {"method": method} for method in methods_of(case, STAGES[role].methods)

@@ -53,6 +53,8 @@ def of_line() -> list[str]:
 
 def possible(stage, case: str) -> bool:
     """Whether a case has what a stage of it needs: methods, and a random track for its parts."""
+    if stage.name == "paper_and_ours" and RESPONSE not in parameters.responses_of_study:
+        return False
     of_track = "track_runs" in (stage.name, *stage.inputs)
     if "tracks" in (stage.name, *stage.inputs) and not on_tracks(case):
         return False
@@ -73,6 +75,8 @@ def results() -> list[str]:
         wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
         if name == "control_study" and not CONTROL_CASES:
             continue
+        if name == "limit_state_table" and not parameters.cases:
+            continue
         if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
             files.append(file_of(name))
         if wildcards == {"case"}:
@@ -91,4 +95,8 @@ def figures_of_study() -> list[str]:
         f"<results>/figures/{name}.png"
         for name, (_, _, files) in DRAWN.items()
         if files
+    ] + [
+        f"<results>/figures/{case}/{name}.png"
+        for name in OF_CASE
+        for case in parameters.cases
     ]

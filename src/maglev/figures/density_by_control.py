@@ -1,4 +1,4 @@
-"""Densities of the six extremes for each sharing of circuits, and with lag."""
+"""Densities of the extremes for each sharing of circuits, and with lag."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def figure(
         name, look = labels.control_style(design)
         looks.append(look)
         words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
-    fig, panels = labels.response_panels(4.7)
+    fig, panels = labels.response_panels(found, 4.7)
     for response, axis, shown in panels:
         curves.draw_densities(axis, found, response, looks)
         low, high = curves.body(found, response, 5e-3)

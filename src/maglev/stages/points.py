@@ -44,8 +44,26 @@ def case_of(config: Config, name: str) -> Case:
 
 
 def parameters(config: Config, case: str) -> tuple[str, ...]:
-    """Dotted keys of what is random in a case, in their order in files and arrays."""
+    """Dotted keys of what is random in a case, in their order in files and arrays.
+
+    Examples
+    --------
+    >>> parameters(Config(), "only_suspension_derivative")
+    ('gains.suspension_derivative',)
+    """
     return tuple(case_of(config, case).random)
+
+
+def named_values(config: Config, case: str, values: FloatArray) -> xr.DataArray:
+    """Random quantities (sample, parameter) of a case with their keys and units, for a file."""
+    keys = parameters(config, case)
+    units = ", ".join(config.unit_of(key) or "1" for key in keys)
+    return xr.DataArray(
+        values,
+        dims=("sample", "parameter"),
+        coords={"parameter": list(keys)},
+        attrs={"units_by_parameter": units},
+    )
 
 
 def laws_of(config: Config, case: str) -> dict[str, Distribution]:
@@ -219,7 +237,7 @@ def dataset(config: Config, case: str, points: PointSet) -> xr.Dataset:
     return xr.Dataset(
         {
             **{gain: (("sample",), gains[:, k]) for k, gain in enumerate(GAINS)},
-            "value": (("sample", "parameter"), values),
+            "parameter_value": named_values(config, case, values),
             "standard": (("sample", "parameter"), points.standard),
             "probability": (("sample",), points.probability),
             "discrepancy": ((), points.discrepancy),

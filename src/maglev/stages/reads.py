@@ -23,7 +23,10 @@ RANDOM_QUANTITIES = RUNS_OF_CASE
 """What points of a case are drawn by: any number may be the mean of one that is random."""
 
 PREDICTING = ("seed", "study.confidence", "study.n_population")
-"""Keys of a predictor, without the kind of its surrogate."""
+"""What a predictor is made with, beside the kind of its surrogate and the responses."""
+
+RESPONSES_OF_STUDY = ("study.responses",)
+"""What is predicted: the responses of the study, those of the limit states among them."""
 
 SURROGATE_OF_METHODS = tuple(f"study.{method}.surrogate" for method in DESIGNED)
 """The kind of surrogate of every method."""

@@ -28,7 +28,14 @@ from maglev.errors import UserError
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
 from maglev.simulation import simulate
-from maglev.stages.points import GAIN_COLUMNS, gains_at, others_at, parameters, values_at
+from maglev.stages.points import (
+    GAIN_COLUMNS,
+    gains_at,
+    named_values,
+    others_at,
+    parameters,
+    values_at,
+)
 from maglev.stages.reads import TRAIN_ON_GUIDEWAY
 from maglev.vocabulary import GAINS, STEP_TOO_LARGE
 
@@ -96,8 +103,8 @@ def _keys_in(path: Path, written: int) -> tuple[bytes, ...]:
     """Keys of the runs of one file, cached by its time of modification [ns]."""
     with _FILES, netCDF4.Dataset(path) as file:
         numbers = np.stack([np.asarray(file[name][:], dtype=np.float64) for name in GAINS], axis=1)
-        if "value" in file.variables:
-            numbers = np.hstack([numbers, np.asarray(file["value"][:], dtype=np.float64)])
+        if "parameter_value" in file.variables:
+            numbers = np.hstack([numbers, np.asarray(file["parameter_value"][:], dtype=np.float64)])
         seeds = None
         if "track_seed" in file.variables:
             seeds = np.asarray(file["track_seed"][:], dtype=np.int64)
@@ -143,7 +150,7 @@ def stored_runs(
     -------
     passages
         Layout ``passage`` without histories, in the order of ``gains``; with ``track_seed`` if
-        seeds are given, and ``value`` by parameter if values are.
+        seeds are given, and ``parameter_value`` if values are.
 
     Raises
     ------
@@ -220,7 +227,10 @@ def _compute(
     if seeds is not None:
         computed["track_seed"] = (("sample",), seeds)
     if varied:
-        computed["value"] = (("sample", "parameter"), np.column_stack(list(varied.values())))
+        computed["parameter_value"] = (
+            ("sample", "parameter"),
+            np.column_stack(list(varied.values())),
+        )
         computed = computed.assign_coords(parameter=list(varied))
     _refuse_too_large_steps(gains, computed)
     numbers = np.column_stack([gains, *varied.values()])
@@ -314,7 +324,7 @@ def runs(
         passages.drop_dims("parameter", errors="ignore")
         .assign(
             standard=(("sample", "parameter"), standard),
-            value=(("sample", "parameter"), drawn),
+            parameter_value=named_values(config, case, drawn),
             probability=(("sample",), probability),
         )
         .assign_coords(parameter=list(parameters(config, case)))
