@@ -68,8 +68,9 @@ def named_values(config: Config, case: str, values: FloatArray) -> xr.DataArray:
 
 def laws_of(config: Config, case: str) -> dict[str, Distribution]:
     """Distribution of every random quantity of a case by its dotted key, in SI."""
+    keys = parameters(config, case)
     own = config.with_case_set(case)
-    return {key: own.distribution(case, key) for key in parameters(config, case)}
+    return {key: own.distribution(case, key) for key in keys}
 
 
 def marginals(config: Config, case: str) -> Marginals:

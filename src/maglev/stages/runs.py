@@ -212,14 +212,14 @@ def _compute(
     n_threads: int,
 ) -> Path:
     """Compute some runs and write them as one file of the store."""
-    columns = [
+    further = [
         varied.get(key, np.full(gains.shape[0], value))
         for key, value in zip(GAIN_COLUMNS[len(GAINS) :], config.gains.further, strict=True)
     ]
     others = {key: column for key, column in varied.items() if key not in GAIN_COLUMNS}
     computed = simulate(
         config,
-        np.column_stack([gains, *columns]),
+        np.column_stack([gains, *further]),
         values=others or None,
         track_seeds=seeds,
         n_threads=n_threads,
