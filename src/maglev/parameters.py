@@ -1170,18 +1170,23 @@ class LimitState(Parameters):
 
     @model_validator(mode="after")
     def _check(self) -> LimitState:
-        kinds = [
-            key for key in ("response", "any_of", "all_of") if getattr(self, key) not in (None, ())
+        said = [
+            key
+            for key in ("response", "limit", "any_of", "all_of")
+            if getattr(self, key) not in (None, ())
         ]
-        if len(kinds) != 1:
+        if self.parts and len(said) > 1:
             raise ValueError(
-                "must have exactly one of: response with its limit, any_of, all_of; got "
-                f"{' and '.join(kinds) or 'none'}"
+                f"{said[0]} cannot stand beside {said[-1]}: a limit state has a response with its "
+                "limit, or any_of, or all_of"
+            )
+        if not said:
+            raise ValueError(
+                "response is missing: a limit state has a response with its limit, or any_of, or "
+                "all_of"
             )
         if len(set(self.parts)) < len(self.parts):
-            raise ValueError(
-                f"{kinds[0]} must not name anything twice, got {', '.join(self.parts)}"
-            )
+            raise ValueError(f"{said[0]} must not name anything twice, got {', '.join(self.parts)}")
         if (self.response is None) != (self.limit is None):
             missing = "limit" if self.limit is None else "response"
             raise ValueError(f"{missing} is missing: a response needs a limit, a limit a response")

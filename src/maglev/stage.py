@@ -165,7 +165,7 @@ class Stage:
         whole = config.with_responses().quantities()
         part = _chosen(whole, keys)
         if "study" in part and "limit_states" not in part:  # their responses are in the study
-            part["limit_states"] = dict.fromkeys(whole["limit_states"])
+            part["limit_states"] = dict.fromkeys(Config.model_fields["limit_states"].default)
         if self.reads_of != "run":
             assert case is not None  # keys has asked for it
             own = {"methods": [method or BASELINE], **part.get("cases", {}).get(case, {})}

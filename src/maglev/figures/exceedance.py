@@ -13,6 +13,12 @@ from maglev.errors import UserError
 from maglev.figures import curves, labels, style
 
 _ENDS = ("", "_low", "_high")
+_LIMIT = "#CC79A7"
+"""Colour of limits, which no method has."""
+
+_LINE = 0.07
+"""Height of a line of text over that of a panel."""
+
 _WITHIN = 3.0
 """Widths of the curves within which a limit still widens a panel; one farther off is written."""
 
@@ -62,11 +68,12 @@ def figure(
                 ),
             )
         axis.set_yscale("log")
-        axis.set_ylim(floor, 1.3)
         low, high = curves.body(found, response, 1e-3)
         axis.set_xlim(shown.scale * low, shown.scale * high)
         name = str(found["response"].to_numpy()[response])
-        _draw_limits(axis, found.sel(limit_state=found["state_response"] == name), shown, methods)
+        of_response = found.sel(limit_state=found["state_response"] == name)
+        n_lines = _draw_limits(axis, of_response, shown, methods)
+        _leave_room(axis, floor, n_lines)
         axis.locator_params(axis="x", nbins=5)
         axis.set_xlabel(shown.axis)
         if response % labels.COLUMNS == 0:
@@ -95,8 +102,17 @@ def _floor(found: xr.Dataset) -> float:
     return 0.7 * float(exceedance[exceedance > 0].min())
 
 
-def _draw_limits(axis: Axes, states: xr.Dataset, shown: labels.Shown, methods: list[str]) -> None:
-    """Draw the limits of a response; write their probability by each method above the curves."""
+def _leave_room(axis: Axes, floor: float, n_lines: int) -> None:
+    """Let probabilities end below some lines of text at the top of a panel."""
+    share = min(0.03 + _LINE * n_lines, 0.7)
+    decades = -np.log10(floor)
+    axis.set_ylim(floor, 10.0 ** (0.08 * decades + decades * share / (1.0 - share)))
+    axis.set_yticks([10.0**-k for k in range(int(decades) + 1)])
+    axis.minorticks_off()
+
+
+def _draw_limits(axis: Axes, states: xr.Dataset, shown: labels.Shown, methods: list[str]) -> int:
+    """Draw the limits of a response, write their probability by each method; number of lines."""
     lines: list[tuple[str, str]] = []
     for number in range(states.sizes["limit_state"]):
         state = states.isel(limit_state=number)
@@ -104,11 +120,11 @@ def _draw_limits(axis: Axes, states: xr.Dataset, shown: labels.Shown, methods: l
         low, high = axis.get_xlim()
         if low <= limit <= high + _WITHIN * (high - low):
             axis.set_xlim(low, max(high, limit + 0.05 * (limit - low)))
-            axis.axvline(limit, color=style.REFERENCE, lw=0.9, ls=":")
+            axis.axvline(limit, color=_LIMIT, lw=0.9, ls=":")
         where = "" if low <= limit <= axis.get_xlim()[1] else " (right of the panel)"
         where = " (left of the panel)" if limit < low else where
         name = str(state["limit_state"].item())
-        lines.append((f"{name}, {limit:.4g} {shown.unit}{where}", style.REFERENCE))
+        lines.append((f"{name}, {limit:.4g} {shown.unit}{where}", _LIMIT))
         for curve, method in enumerate(methods):
             one = state.isel(curve=curve)
             value, least, most = (float(one[f"curve_state_probability{end}"]) for end in _ENDS)
@@ -119,7 +135,7 @@ def _draw_limits(axis: Axes, states: xr.Dataset, shown: labels.Shown, methods: l
     for row, (words, colour) in enumerate(lines):
         axis.text(
             0.99,
-            0.98 - 0.075 * row,
+            0.99 - _LINE * row,
             words,
             color=colour,
             transform=axis.transAxes,
@@ -129,9 +145,13 @@ def _draw_limits(axis: Axes, states: xr.Dataset, shown: labels.Shown, methods: l
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.3},
             zorder=5,
         )
+    return len(lines)
 
 
 def _interval(value: float, low: float, high: float) -> str:
     """A probability with its interval in per cent."""
-    ends = (f"{100 * one:.3g}" for one in (value, low, high))
+    ends = (
+        np.format_float_positional(float(f"{100 * one:.3g}"), trim="-")
+        for one in (value, low, high)
+    )
     return "P = {} [{}, {}] %".format(*ends)

@@ -19,6 +19,7 @@ from maglev.uncertainty.limit_states import (
     IMPOSSIBLE,
     Probability,
     counted,
+    error_growth,
     predicted,
     reliability_index,
     with_losses,
@@ -146,9 +147,10 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
     """Find the probabilities of the limit states on a large population, all responses together.
 
     The interval moves each response by the range of leave-one-out residuals of the training
-    samples nearest to its limit, all of them to the same side, and holds the ends of the
-    interval of the lost probability.  Where no run was lost, the upper end of that is the
-    binomial one: it then stands in every limit state, not in those given that levitation holds.
+    samples nearest to its limit, more where it extrapolates, all of them to the same side, and
+    holds the ends of the interval of the lost probability.  Where no run was lost, the upper end
+    of that is the binomial one: it then stands in every limit state, not in those given that
+    levitation holds.
 
     Parameters
     ----------
@@ -171,7 +173,7 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
 
     References
     ----------
-    docs/theory/reliability.md, eqs. (18) and (19).
+    docs/theory/reliability.md, eqs. (18) to (20).
     """
     states, responses = config.limit_states, responses_of(surrogate)
     for name, state in _singles(states).items():
@@ -187,18 +189,20 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
         raise UserError(f"all {held.size} points of the population are predicted to be lost")
     predictions = found.surrogate.predict(points[held])
     none = np.zeros(len(predictions), dtype=bool)
-    errors = _errors(config, responses, found.surrogate.values, found.surrogate.leave_one_out())
-
-    def moved(end: int | None) -> dict[str, BoolArray]:
-        beyond = {}
-        for name, state in _singles(states).items():
-            assert state.response is not None
-            shift = 0.0 if end is None else errors[name][end]
-            column = predictions[:, responses.index(state.response)]
-            beyond[name] = column + shift > state.threshold
-        return exceeded(states, beyond, none)
-
-    plain, least, most = moved(None), moved(0), moved(1)
+    training, residuals = found.surrogate.values, found.surrogate.leave_one_out()
+    beyond: list[dict[str, BoolArray]] = [{}, {}, {}]
+    for name, state in _singles(states).items():
+        column = responses.index(str(state.response))
+        ends = _with_errors(
+            state.threshold,
+            predictions[:, column],
+            training[:, column],
+            residuals[:, column],
+            config.study.confidence,
+        )
+        for of, values in zip(beyond, ends, strict=True):
+            of[name] = values > state.threshold
+    plain, least, most = (exceeded(states, of, none) for of in beyond)
 
     def given(name: str) -> Probability:
         return predicted(plain[name], least[name], most[name], config.study.confidence)
@@ -214,23 +218,23 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
     )
     result["probability"].attrs["comment"] = (
         "on a population of the surrogate, all responses together; interval: leave-one-out "
-        f"residuals near each limit, sampling, and losses: {loss_comment(loss)}"
+        "residuals near each limit, grown where it extrapolates, sampling, and losses: "
+        f"{loss_comment(loss)}"
     )
     return result
 
 
-def _errors(
-    config: Config, responses: tuple[str, ...], training: FloatArray, residuals: FloatArray
-) -> dict[str, tuple[float, float]]:
-    """Least and largest error of the surrogate near each limit [unit of its response]."""
-    found = {}
-    for name, state in _singles(config.limit_states).items():
-        column = responses.index(str(state.response))
-        low, high = error_range_near(
-            state.threshold, training[:, column], residuals[:, column], config.study.confidence
-        )
-        found[name] = (float(low[0]), float(high[0]))
-    return found
+def _with_errors(
+    threshold: float,
+    predictions: FloatArray,
+    training: FloatArray,
+    residuals: FloatArray,
+    confidence: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Predictions (point,) as they are, with the least and with the largest error near a limit."""
+    low, high = error_range_near(threshold, training, residuals, confidence)
+    growth = error_growth(predictions, training)
+    return predictions, predictions + low[0] * growth, predictions + high[0] * growth
 
 
 def _given_held(

@@ -116,6 +116,47 @@ def predicted(
     return Probability(value, min(float(low), value), max(float(high), value))
 
 
+def error_growth(predictions: npt.ArrayLike, training: npt.ArrayLike) -> FloatArray:
+    """How many times the error of a surrogate is larger where it extrapolates.
+
+    Beyond the largest value that it was trained with, no residual says how far it errs.  Its error
+    is taken to grow with the square of the way beyond, in deviations of the training values;
+    assumed, the coverage is counted (docs/theory/reliability.md, sec. 6).
+
+    Parameters
+    ----------
+    predictions : (point,)
+        Of the surrogate [unit of the response].
+    training : (sample,)
+        Values of the runs [unit].
+
+    Returns
+    -------
+    growth : (point,)
+        1 up to the largest training value [-].
+
+    Raises
+    ------
+    UserError
+        If the training values do not vary.
+
+    References
+    ----------
+    docs/theory/reliability.md, eq. (20).
+
+    Examples
+    --------
+    >>> error_growth([0.0, 1.0, 2.0], [-1.0, 1.0])
+    array([1., 1., 4.])
+    """
+    training = np.asarray(training, dtype=float)
+    deviation = training.std()
+    if not deviation > 0.0:
+        raise UserError(f"training values must vary, got {training.size} that do not")
+    beyond = np.maximum(np.asarray(predictions, dtype=float) - training.max(), 0.0)
+    return (1.0 + beyond / deviation) ** 2
+
+
 def with_losses(held: Probability, lost: Probability) -> Probability:
     """Probability that something is exceeded or levitation lost, from that given that it holds.
 
