@@ -12,7 +12,6 @@ from numpy.testing import assert_allclose
 from test_figures import VALIDATION
 
 from maglev import datasets
-<<<<<<< HEAD
 from maglev.figures import (
     FIGURES,
     curves,
@@ -26,10 +25,6 @@ from maglev.figures import (
     style,
 )
 from maglev.vocabulary import PAPER_RESPONSES
-=======
-from maglev.figures import FIGURES, curves, draw, exceedance, labels, layouts_of, stability, style
-from maglev.vocabulary import PAPER_RESPONSES
->>>>>>> states
 
 
 @pytest.fixture(scope="module")

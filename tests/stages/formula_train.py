@@ -68,7 +68,8 @@ class FormulaTrain:
         gains = gains[:, : len(GAINS)]
         standard = (gains / np.array(config.gains.as_row) - 1) / 0.1
         made = synthetic.runs(standard, loses=True).drop_vars(
-            ["standard", "parameter_value", "probability", "track_seed", "parameter"], errors="ignore"
+            ["standard", "parameter_value", "probability", "track_seed", "parameter"],
+            errors="ignore",
         )
         for k, name in enumerate(GAINS):
             made[name] = ("sample", gains[:, k])

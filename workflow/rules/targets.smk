@@ -83,9 +83,7 @@ def results() -> list[str]:
             cases = [case for case in CASES if possible(stage, case)]
             files += [file_of(name, case=case) for case in cases]
         if wildcards == {"case", "method"}:
-            files += [
-                file for case in CASES for file in of_methods(name, case)
-            ]
+            files += [file for case in CASES for file in of_methods(name, case)]
     return files
 
 

@@ -129,7 +129,7 @@ def apart(curves: xr.Dataset, response: int) -> BoolArray:
 
 def note_apart(axis: Axes, curve: xr.Dataset, response: int, look: Look) -> None:
     """Write peak and range of a single curve that lies off the panel into its corner."""
-    shown = labels.SHOWN[response]
+    shown = labels.shown(str(curve["response"].values[response]))
     at = curve.isel(curve=0, response=response)
     peak = int(at["curve_density"].argmax("cell"))
     low, high = (shown.scale * end for end in body(curve, response, 5e-3))

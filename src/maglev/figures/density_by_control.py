@@ -36,13 +36,6 @@ def figure(
         name, look = labels.control_style(design)
         looks.append(look)
         words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
-<<<<<<< HEAD
-    fig, panels = labels.response_panels(found, 4.7)
-    for response, axis, shown in panels:
-        curves.draw_densities(axis, found, response, looks)
-        low, high = curves.body(found, response, 5e-3)
-        axis.set_xlim(shown.scale * low, shown.scale * high)
-=======
     fig, panels = labels.response_panels(found, 4.7)
     for response, axis, _ in panels:
         far = curves.apart(found, response)
@@ -51,7 +44,6 @@ def figure(
         curves.draw_densities(axis, near, response, near_looks, curves.body(near, response, 5e-3))
         for k in np.flatnonzero(far):
             curves.note_apart(axis, found.isel(curve=[k]), response, looks[k])
->>>>>>> main
     style.below(
         fig,
         [Line2D([], [], **look) for look in looks],

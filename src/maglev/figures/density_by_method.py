@@ -50,13 +50,7 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         {**labels.METHOD_STYLE[name], "label": labels.PDEM[name], "lw": 1.6 - 0.3 * (name != "mcm")}
         for name in methods
     ]
-<<<<<<< HEAD
-    curves.draw_densities(axis, found, response, looks)
-    low, high = curves.body(found, response, 2e-3)
-    axis.set_xlim(shown.scale * low, shown.scale * high)
-=======
     curves.draw_densities(axis, found, response, looks, curves.body(found, response, 2e-3))
->>>>>>> main
     style.titled(axis, "a", shown.name)
 
     at = found.isel(response=response)
