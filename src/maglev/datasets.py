@@ -680,6 +680,11 @@ def _study_table() -> dict[str, Variable]:
                 "probability that the extreme is exceeded or levitation lost",
             ),
         ),
+        "curve_held_exceedance": _number(
+            "curve response cell",
+            "1",
+            "probability that the extreme is exceeded given that levitation holds",
+        ),
         "curve_peak": _number("curve response", PER_RESPONSE, "largest value of the density"),
         "curve_peak_error": _number(
             "curve response", "1", "largest value of the density over that of the baseline, less 1"

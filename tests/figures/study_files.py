@@ -359,7 +359,12 @@ def study(folder, demonstration=False):
         "prediction": [one("prediction", prediction())],
         "density_by_method": by_method,
         "exceedance_by_method": by_method,
+        "density": by_method,
         "exceedance": [*by_method, *states],
+        "limits": [
+            one("limits", limits(lost=lost), method=method)
+            for method, lost in (("mcm", 0.003), ("osm", 0.0), ("asm", 0.003))
+        ],
         "density_by_gain": [*by_gain[0], *by_gain[2]],
         "limits_by_gain": [*by_gain[1], *by_gain[2]],
         "density_by_variation": [*by_variation[0], *by_variation[2]],

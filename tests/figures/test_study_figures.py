@@ -14,12 +14,17 @@ from test_figures import VALIDATION
 from maglev import datasets
 from maglev.figures import (
     FIGURES,
+    accuracy,
     curves,
+    density,
     density_by_control,
+    density_by_method,
     draw,
     exceedance,
+    exceedance_by_method,
     labels,
     layouts_of,
+    limits,
     limits_by_control,
     stability,
     style,
@@ -47,6 +52,7 @@ def test_a_figure_of_the_study_is_drawn_with_its_numbers(tmp_path, files, name):
 
 OF_RESPONSES = [
     "training", "prediction", "density_by_method", "exceedance_by_method", "exceedance",
+    "density", "limits",
     "density_by_gain", "limits_by_gain", "limits_by_variation", "sobol", "accuracy",
     "track_split", "tracks", "track_limits",
 ]  # fmt: skip
@@ -127,6 +133,54 @@ def test_peaks_are_compared_with_the_baseline_and_need_one(tmp_path, files):
             draw(name, files["density_by_method"][1:], tmp_path / "g")
 
 
+def test_the_exceedance_given_that_levitation_holds_stands_beside(files):
+    found = curves.densities(read(files["exceedance_by_method"], "density"))
+    held, lost = curves.held_exceedance(found), found["curve_lost_probability"]
+    assert_allclose(held + lost * (1 - held), found["curve_exceedance"], rtol=1e-12)
+    fig, plotted = exceedance_by_method.figure(read(files["exceedance_by_method"], "density"))
+    assert_allclose(plotted["curve_held_exceedance"], held)
+    for panel in fig.axes:
+        assert [text.get_text() for text in panel.texts] == ["P(lost) = 0.3 %"]
+        zorder = {line.get_label().split(",")[0]: line.get_zorder() for line in panel.get_lines()}
+        assert zorder["ASM-PDEM (ours)"] < min(zorder["MCM"], zorder["OSM-PDEM"])
+
+
+def test_both_motions_of_midspan_have_their_table_of_peaks(files):
+    fig, plotted = density_by_method.figure(read(files["density_by_method"], "density"))
+    titles = [axis.get_title(loc="left") for axis in fig.axes]
+    assert titles[:2] == ["(a) midspan displacement, vert.", "(b) midspan acceleration, vert."]
+    for response, table in ((0, fig.axes[2]), (2, fig.axes[3])):
+        words = [text.get_text() for text in table.texts]
+        scale = 1e3 if response == 0 else 1.0
+        peak = float(plotted["curve_peak"][0, response]) / scale
+        assert f"{peak:.3g}" in words
+        assert sum("± 10.0 %" in one for one in words) == 1
+
+
+def test_figures_of_a_case_need_no_baseline(files):
+    only = read(files["density"][-1:], "density")
+    fig, _ = density.figure(only)
+    assert [text.get_text() for text in fig.legends[0].get_texts()] == [
+        "ASM-PDEM (ours), 400 runs, lost 0.3 %"
+    ]
+    limits.figure(read(files["limits"][-1:], "limits"))
+    states = read(files["exceedance"][-1:], "limit_states")
+    exceedance.figure(only, states)
+
+
+def test_a_baseline_that_carries_no_limit_says_so(files):
+    few = read(files["limits"][:1], "limits")[0]
+    for name in ("limit", "held_limit"):
+        few[f"{name}_status"][:] = 1
+    fig, _ = limits.figure([few])
+    assert [text.get_text() for text in fig.axes[0].texts] == ["no limit: too few runs"]
+    errors = datasets.read(files["accuracy"][0], "accuracy")
+    errors["reference_held_limit"][0] = np.nan
+    fig, _ = accuracy.figure(errors)
+    assert [text.get_text() for text in fig.axes[0].texts] == ["MCM carries no limit: too few runs"]
+    assert fig.axes[1].get_lines()
+
+
 def read(paths, layout):
     return [datasets.read(path, layout) for path in paths]
 
@@ -205,8 +259,8 @@ def test_limits_far_from_all_others_are_noted_and_do_not_squeeze_them(files):
     paths = files["limits_by_control"]
     n = len(paths) // 2
     names = [f"{kind}limit{end}" for kind in ("", "held_") for end in ("", "_low", "_high")]
-    limits = second_far_away(paths[:n], "limits", names)
-    fig, _ = limits_by_control.figure(limits, read(paths[n:], "design"))
+    found = second_far_away(paths[:n], "limits", names)
+    fig, _ = limits_by_control.figure(found, read(paths[n:], "design"))
     panel = fig.axes[2]
     assert panel.get_ylim()[1] < study_files.CENTRE[2] + 0.7
     assert [text.get_text()[:14] for text in panel.texts] == ["off the panel:"]

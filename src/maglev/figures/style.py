@@ -38,6 +38,7 @@ class Look(TypedDict, total=False):
     alpha: float
     rasterized: bool
     label: str
+    zorder: float
 
 
 @contextmanager
