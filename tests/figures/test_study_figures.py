@@ -28,6 +28,7 @@ from maglev.figures import (
     limits_by_control,
     stability,
     style,
+    sweep,
 )
 from maglev.vocabulary import PAPER_RESPONSES
 
@@ -52,7 +53,7 @@ def test_a_figure_of_the_study_is_drawn_with_its_numbers(tmp_path, files, name):
 
 OF_RESPONSES = [
     "training", "prediction", "density_by_method", "exceedance_by_method", "exceedance",
-    "density", "limits",
+    "density", "limits", "sweep",
     "density_by_gain", "limits_by_gain", "limits_by_variation", "sobol", "accuracy",
     "track_split", "tracks", "track_limits",
 ]  # fmt: skip
@@ -179,6 +180,48 @@ def test_a_baseline_that_carries_no_limit_says_so(files):
     fig, _ = accuracy.figure(errors)
     assert [text.get_text() for text in fig.axes[0].texts] == ["MCM carries no limit: too few runs"]
     assert fig.axes[1].get_lines()
+
+
+def test_a_sweep_has_a_line_for_each_level_or_for_each_value_of_its_second_key(files):
+    one = read(files["sweep"], "sweep")[0]
+    fig, _ = sweep.figure(one)
+    panel = fig.axes[1]
+    mean = panel.get_lines()[-1]
+    assert panel.get_xlabel() == "passage speed [km/h]"
+    assert_allclose(mean.get_xdata(), [300, 400, 500])
+    assert_allclose(mean.get_ydata(), 1e3 * one["extreme_at_mean"][:, 1])
+    assert len(panel.get_lines()) == 2 * len(study_files.LEVELS) + 1
+    states = [line.get_label() for line in fig.axes[6].get_lines()]
+    assert states == ["lost", "low", "high", "far", "either"]
+    two = datasets.describe(study_files.sweep(others=["pole", "ends"]))
+    fig, _ = sweep.figure(two.assign_attrs(config=one.attrs["config"]))
+    assert len(fig.axes) == 6 + 5
+    assert len(fig.axes[1].get_lines()) == 2 * 3
+    words = [text.get_text() for text in fig.legends[0].get_texts()]
+    assert words[:3] == ["suspension group: pole", "suspension group: ends", "limit at 0.1"]
+
+
+def test_a_swept_key_has_the_unit_in_which_it_is_written_and_a_speed_that_of_a_person():
+    def axis(key, values, texts, unit):
+        dims = ("setting", "swept_parameter")
+        units = {"units_by_swept_parameter": unit}
+        data = xr.Dataset(
+            {"swept_value": (dims, np.array(values)[:, None], units),
+             "swept_text": (dims, np.array(texts)[:, None])},
+            coords={"swept_parameter": [key]},
+        )  # fmt: skip
+        return sweep._axis(data, 0)
+
+    speed = axis("passage.speed", [100.0, 150.0], ["100 m/s", "540 km/h"], "m/s")
+    assert speed.label == "passage speed [km/h]"
+    assert_allclose(speed.places, [360, 540])
+    lag = axis("control.suspension.lag", [0.001, 0.002], ["1 ms", "2 ms"], "s")
+    assert lag.label == "suspension lag [ms]"
+    assert_allclose(lag.places, [1, 2])
+    mixed = axis("control.suspension.lag", [0.001, 0.002], ["1 ms", "0.002 s"], "s")
+    assert mixed.label == "suspension lag [s]"
+    group = axis("control.suspension.group", [np.nan] * 2, ["pole", "ends"], "")
+    assert (group.words, group.places.tolist()) == (("pole", "ends"), [0, 1])
 
 
 def read(paths, layout):

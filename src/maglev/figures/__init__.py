@@ -22,6 +22,7 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "density": ("density*",),
     "exceedance": ("density*", "limit_states*"),
     "limits": ("limits*",),
+    "sweep": ("sweep",),
     "density_by_gain": ("density*", "design*"),
     "limits_by_gain": ("limits*", "design*"),
     "density_by_variation": ("density*", "design*"),

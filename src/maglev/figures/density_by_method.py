@@ -55,9 +55,11 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         shown = labels.shown(name)
         style.titled(axis, "ab"[column], shown.name)
         _table(below, found.isel(response=response), methods, shown)
+    handles, words = axes[0, 0].get_legend_handles_labels()
     style.below(
         fig,
-        *axes[0, 0].get_legend_handles_labels(),
+        handles,
+        words,
         columns=len(methods),
         title=f"band and ±: {labels.confidence(densities[truth])} sampling noise of MCM; "
         "h: bandwidth of the kernel; Δz: mesh of the GDEE, which acts as a bandwidth",

@@ -82,7 +82,8 @@ def _draw_curve(axis: Axes, one: xr.Dataset, method: str, scale: float) -> None:
         one[name].where(one[name] > 0) for name in ("curve_exceedance", "curve_held_exceedance")
     )
     axis.plot(value, exceedance, **labels.method_line(method), label=words)
-    axis.plot(value, held, **{**labels.METHOD_STYLE[method], "lw": _HELD})
+    thin: style.Look = {**labels.METHOD_STYLE[method], "lw": _HELD}
+    axis.plot(value, held, **thin)
 
 
 def _span(found: xr.Dataset, truth: int, response: int) -> tuple[float, float]:
