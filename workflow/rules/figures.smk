@@ -116,7 +116,7 @@ DRAWN = {
     "fig_track_split": (
         "track_split",
         "what random gains and a random track contribute",
-        [file_of("track_split", case=case) for case in TRACK_CASES[:1]],
+        of_first_split(),
     ),
 }
 

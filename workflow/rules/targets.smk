@@ -64,6 +64,17 @@ def possible(stage, case: str) -> bool:
     )
 
 
+def of_split(case: str) -> list[str]:
+    """The file of a case on what its track contributes, if it has one."""
+    stage = STAGES["track_split"]
+    return [file_of("track_split", case=case)] if possible(stage, case) else []
+
+
+def of_first_split() -> list[str]:
+    """The first such file of any case."""
+    return [file for case in CASES for file in of_split(case)][:1]
+
+
 def cases_of(stage) -> list[str]:
     """Cases that a stage of each case is made for."""
     if stage.name == "sweep":
@@ -117,6 +128,8 @@ def figures_of_case(case: str) -> dict[str, tuple[str, list[str]]]:
     if methods_of(case, (BASELINE,)):
         file = file_of("baseline", case=case, method=BASELINE)
         figures["scatter"] = ("scatter", [file])
+    if of_split(case):
+        figures["track_split"] = ("track_split", of_split(case))
     if judged(case):
         for name in ("accuracy", "prediction"):
             figures[name] = (name, [file_of(name, case=case)])
