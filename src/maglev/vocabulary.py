@@ -22,6 +22,16 @@ Response = Literal[
 RESPONSES: tuple[Response, ...] = get_args(Response)
 """The responses in the order of ``response`` in files and arrays."""
 
+RecordedResponse = Literal[
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+    "car_body_acceleration_z",
+    "car_body_acceleration_y",
+]
+"""A response whose history is recorded."""
+
 _GIRDER = "of the girder at midspan of the middle span"
 _CAR = "of the car body, largest over the cars"
 RESPONSE_WORDS: Mapping[Response, str] = {
@@ -120,6 +130,10 @@ likelier than the failure probability, so that none is finite."""
 DENSITY_METHODS = ("gdee", "gdee_of_the_logarithm", "direct")
 """How a density was found: by the GDEE; by the GDEE of the logarithm of the extreme, where strays
 ask for too fine a mesh; directly, where there is no GDEE or it refused both."""
+
+BARRIER_SOURCES = ("limit", "mean_and_deviations")
+"""What a barrier of the first passage is: the limit of the extreme at the failure probability; or,
+where none is given, its mean and as many deviations as a normal variate has at that probability."""
 
 SOURCES = ("paper", "ours")
 """Whose number stands there."""
