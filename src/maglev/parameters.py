@@ -1094,7 +1094,7 @@ class InTime(Parameters):
         min_length=1,
     )
     n_times: int = _count(
-        400, "times at which densities are given, from start to end of a passage", minimum=3
+        600, "times at which densities are given, from start to end of a passage", minimum=3
     )
 
     @model_validator(mode="after")
