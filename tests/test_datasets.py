@@ -9,6 +9,7 @@ import xarray as xr
 
 from maglev import datasets
 from maglev.datasets import LAYOUTS, VARIABLES, describe, read, write
+from maglev.vocabulary import RESPONSES
 
 CONFIG = {"seed": 3, "demonstration": False, "passage": {"speed": "100.0 m/s"}}
 
@@ -20,6 +21,7 @@ def filled(layout):
     sizes |= {"method": 2, "failure_probability": 3, "round": 2, "step": 3, "cell": 5, "check": 2}
     sizes |= {"source": 2, "grid_derivative": 2, "grid_proportional": 3}
     sizes |= {"train_part": 9, "current_lag": 2, "track": 3, "curve": 2, "beam_frequency": 4}
+    sizes |= {"path_step": 13, "quantile_level": 3}
     names = [*LAYOUTS[layout].variables, *LAYOUTS[layout].optional]
     dims = {dim for name in names for dim in VARIABLES[name].dims}
     coords = {dim: np.arange(sizes[dim]) for dim in sorted(dims)}
@@ -91,6 +93,15 @@ def test_extremes_are_double_histories_single_and_both_compressed(tmp_path):
         assert file["gap_history"].dtype == np.float32
         filters = file["gap_history"].filters()
         assert (filters["zlib"], filters["complevel"], filters["shuffle"]) == (True, 4, True)
+
+
+def test_responses_may_be_called_by_their_names(tmp_path):
+    made = filled("density_in_time").assign_coords(response=list(RESPONSES))
+    datasets.write(made, tmp_path / "one.nc", "density_in_time", config=CONFIG, code="abc")
+    found = datasets.read(tmp_path / "one.nc", "density_in_time")
+    assert found["response"].to_numpy().tolist() == list(RESPONSES)
+    assert "flag_values" not in found["response"].attrs
+    assert found["mean_in_time"].sel(response="girder_acceleration_y").size == 5
 
 
 def test_another_unit_is_refused():

@@ -1101,7 +1101,7 @@ LAYOUTS: Mapping[str, Layout] = {
     ),
     "histories": Layout(
         title="Histories of responses, thinned",
-        variables=(*GAINS, "path", "extreme_of_path", "status", "lost_t", "t"),
+        variables=(*GAINS, "path", "extreme_of_path", "status", "lost_t"),
         optional=("track_seed",),
     ),
     "density_in_time": Layout(
@@ -1182,7 +1182,7 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
                 f"'{name}' must stand on {variable.dims}, got {tuple(described[name].dims)}"
             )
         attributes = variable.attributes
-        if described[name].dtype.kind in "UO":
+        if name in described.dims and described[name].dtype.kind in "UO":
             attributes = {"long_name": variable.long_name}
         described[name].attrs = {**described[name].attrs, **attributes}
     return described
@@ -1315,7 +1315,7 @@ def write_netcdf(dataset: xr.Dataset, path: str | Path) -> None:
     encoding: dict[str, dict[str, Any]] = {}
     for name in map(str, ordered.variables):
         ordered[name].encoding = {}
-        if ordered[name].dtype.kind in "UO":
+        if name in ordered.dims and ordered[name].dtype.kind in "UO":
             encoding[name] = {"dtype": str}
             continue
         dtype = VARIABLES[name].dtype
