@@ -42,8 +42,17 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        If there is no such file, or it is not YAML, or a key stands twice, or its top level is
-        something else.
+        If there is no such file, it is not YAML, a key stands twice, or the top level is no
+        mapping.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "fast.yaml"
+    ...     _ = path.write_text("passage: {speed: 500 km/h}")
+    ...     read_yaml(path)
+    {'passage': {'speed': '500 km/h'}}
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -137,7 +146,17 @@ def read_overlays(path: str | Path, above: tuple[Path, ...] = ()) -> dict[str, A
     Raises
     ------
     ConfigError
-        As `read_yaml` does, or if files extend each other in a circle.
+        As `read_yaml`, or if files extend each other in a circle.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = (Path(folder) / "base.yaml").write_text("{seed: 1, run: base}")
+    ...     path = Path(folder) / "other.yaml"
+    ...     _ = path.write_text("{extends: base.yaml, seed: 2}")
+    ...     read_overlays(path)
+    {'seed': 2, 'run': 'base'}
     """
     path = Path(path)
     if path.resolve() in above:

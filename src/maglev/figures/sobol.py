@@ -1,4 +1,4 @@
-"""Which gain matters for which response: Sobol' indices of the surrogate."""
+"""Sobol' indices of the surrogate: the effect of each gain on each response."""
 
 from __future__ import annotations
 

@@ -80,7 +80,9 @@ def panels(rows: int, columns: int, width: float, height: float) -> tuple[Figure
     return figure, axes
 
 
-def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None:
+def note(
+    axis: Axes, text: str, *, top: bool = True, right: bool = True, color: str = "#000000"
+) -> None:
     """Write a note into a corner of a panel."""
     axis.text(
         0.98 if right else 0.02,
@@ -90,6 +92,7 @@ def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None
         ha="right" if right else "left",
         va="top" if top else "bottom",
         fontsize=7,
+        color=color,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
         zorder=5,
     )

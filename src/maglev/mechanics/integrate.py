@@ -73,7 +73,7 @@ def prepare(config: Config, profile: Profile) -> System:
     config
         Parameters of everything.
     profile
-        Track irregularity over `track_range`; nothing before the fade-in, where the train rests.
+        Track irregularity over `track_range`, zero before the fade-in, where the train rests.
 
     Returns
     -------
@@ -129,9 +129,8 @@ def integrate(
 ) -> Passages:
     """Run one passage per row of gains.
 
-    A sample whose gains make a motion grow by the step alone is not judged: its status says so.
-
-    A sample's numbers do not depend on its neighbours, on their number or on ``n_threads``.
+    A sample for whose gains the step is unstable is not judged: its status says so.  A sample's
+    numbers do not depend on its neighbours, on their number or on ``n_threads``.
 
     Parameters
     ----------
@@ -219,7 +218,7 @@ def integrate(
 
 
 def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ...]) -> None:
-    """Refuse a step at which the guideway, or the train at its mean gains, would grow by itself."""
+    """Refuse a step that is unstable for the guideway or for the train at its mean gains."""
     dt, gains = course(config).time_step, _mean_gains(config)
     limit = guideway_limit(config, reduced, dt)
     if not step_holds(parts, gains, dt):

@@ -118,8 +118,8 @@ def of_surrogate(
 
     Points that are more likely lost than held are left out, the others keep their proportions;
     the probability of loss is that of the surrogate's file.  Exceedance is the exact weighted one.
-    Its interval moves the predictions by the range of leave-one-out residuals near each value and
-    the lost probability to the ends of its own interval, where runs were lost.
+    Its interval shifts the predictions by the range of leave-one-out residuals near each value,
+    and, where runs were lost, the lost probability to the ends of its own interval.
 
     Parameters
     ----------
@@ -135,8 +135,8 @@ def of_surrogate(
     Returns
     -------
     dataset
-        Layout ``density``; ``density_method`` says where strays made the GDEE go by the logarithm
-        or refuse; a density that it refused is the direct one.
+        Layout ``density``; ``density_method`` says where strays required the GDEE of the logarithm,
+        or the direct density instead of any GDEE.
 
     Raises
     ------

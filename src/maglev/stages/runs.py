@@ -1,9 +1,9 @@
 """Runs of the model, each computed once: a store that all cases and methods share.
 
-The store is a folder for all that decides a run but its gains (and its track seed): train,
-guideway, irregularity, passage, seed and code.  In it lie small files of some runs each, written
-aside and renamed into place, so that a run is there as a whole or not at all.  A run is found again
-by the exact bytes of its gains.
+The store has a folder for each set of train, guideway, irregularity, control, passage, seed and
+code: all that decides a run but its gains and its track seed.  A folder holds small files of runs,
+written aside and renamed, so that a run is stored whole or not at all.  The exact bytes of its
+gains identify a run.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _FILES = threading.Lock()
 """Held while a file is open: the NetCDF library serves one thread at a time."""
 
 BATCH = 32
-"""Runs computed and stored together, whole rows of samples of the production solver: what a kill
-loses at most."""
+"""Runs computed and stored together, whole rows of samples of the production solver; an
+interruption costs at most as many."""
 
 
 @cache
@@ -52,7 +52,7 @@ def _code() -> str:
 
 
 def content(config: Config) -> dict[str, object]:
-    """All parameters that decide a run besides its four gains; files by their bytes."""
+    """All parameters that decide a run except its four gains; files are given by their hash."""
     whole = config.quantities()
     part = {name: whole[name] for name in TRAIN_ON_GUIDEWAY}
     part["further_gains"] = list(config.gains.further)
