@@ -33,7 +33,7 @@ highest frequency in the band of the responses."""
 def simulate(
     config: Config,
     gains: npt.ArrayLike,
-    histories: bool = False,
+    histories: bool | Literal["responses"] = False,
     solver: Literal["production", "reference"] = "production",
     *,
     track_seeds: npt.ArrayLike | None = None,
@@ -50,7 +50,8 @@ def simulate(
         Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m]; then suspension k_a
         [A s²/m], k_i [A/(m s)], guidance k_a, k_i, those of ``config.gains`` if left out.
     histories
-        Whether to keep the time series of responses, gaps and currents.
+        Whether to keep the time series of responses, gaps and currents; ``"responses"``: without
+        gaps and currents, which are most of their size.
     solver
         ``"production"``: compiled, many samples at once; ``"reference"``: full finite elements with
         a step of its own, halved until the extremes are right to 0.1 %, some thousand times slower.
@@ -101,6 +102,8 @@ def simulate(
     'completed'
     """
     gains = checked_gains(gains, config.gains.further)
+    if histories not in (False, True, "responses"):
+        raise UserError(f"histories must be False, True or 'responses', got {histories!r}")
     if solver not in ("production", "reference"):
         raise UserError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
@@ -113,6 +116,7 @@ def simulate(
             gains,
             profile_of=None if seeds is None else _tracks_of(config, seeds),
             record_every=every,
+            with_magnets=histories != "responses",
             n_threads=n_threads,
             on_progress=on_progress,
         )
@@ -218,7 +222,9 @@ def _system(config: Config, _track_file: str) -> integrate.System:
     return integrate.prepare(config, track(config))
 
 
-def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: bool) -> xr.Dataset:
+def _dataset(
+    config: Config, gains: FloatArray, passages: Passages, histories: bool | str
+) -> xr.Dataset:
     one, way = ("sample",), course(config)
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)
@@ -250,6 +256,8 @@ def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: b
         of_car = ("sample", "car", "t")
         variables["car_body_acceleration_z_history"] = (of_car, passages.body_z_history)
         variables["car_body_acceleration_y_history"] = (of_car, passages.body_y_history)
+        coordinates |= {"t": passages.time}
+    if histories and histories != "responses":
         of_magnet = ("sample", "magnet", "t")
         variables["gap_history"] = (of_magnet, passages.gap_history)
         variables["current_history"] = (of_magnet, passages.current_history)
@@ -257,7 +265,7 @@ def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: b
         variables["magnet_kind"] = (("magnet",), magnets.is_guidance.astype(np.int8))
         variables["magnet_side"] = (("magnet",), magnets.side)
         variables["magnet_x"] = (("magnet",), magnets.x)
-        coordinates |= {"magnet": np.arange(magnets.x.size), "t": passages.time}
+        coordinates |= {"magnet": np.arange(magnets.x.size)}
     return xr.Dataset(
         variables,
         coords=coordinates,

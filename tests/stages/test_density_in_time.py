@@ -168,7 +168,12 @@ def test_a_path_of_the_model_reaches_its_extreme():
             "irregularity": {"n_harmonics": 50, "wavelength_max": "20 m"},
         }
     )
-    passages = simulate(tiny, np.array([tiny.gains.as_row]) * [[1.0], [1.05]], histories=True)
+    gains = np.array([tiny.gains.as_row]) * [[1.0], [1.05]]
+    passages = simulate(tiny, gains, histories="responses")
+    assert not {"gap_history", "magnet"} & set(passages.variables)
+    whole = simulate(tiny, gains, histories=True)
+    assert "gap_history" in whole
+    xr.testing.assert_identical(passages, whole[list(passages.data_vars)].drop_vars("magnet"))
     ends = np.linspace(0, passages.sizes["t"], 40).astype(int)
     for name in RESPONSES:
         path = histories._path(passages, name, ends)
@@ -177,6 +182,11 @@ def test_a_path_of_the_model_reaches_its_extreme():
                                ((0, 0), (1, 0))), ends, [np.nan] * 2, [np.nan] * 2)  # fmt: skip
         # records a millisecond apart miss little of a peak
         assert_allclose(plain.max(axis=1), passages[name], rtol=0.01, err_msg=name)
+
+
+def test_other_histories_are_refused():
+    with pytest.raises(ValueError, match="histories must be False, True or 'responses', got 'all'"):
+        simulate(PARAMETERS, [PARAMETERS.gains.as_row], histories="all")
 
 
 def test_an_unknown_case_is_refused_before_anything_is_computed():

@@ -88,7 +88,11 @@ def _course(axis: Axes, at: xr.Dataset, shown: labels.Shown) -> None:
     speed = float(at["nose"][-1] - at["nose"][0]) / float(t[-1] - t[0])
     start = float(at["nose"][0]) - speed * t[0]
     above = axis.secondary_xaxis(
-        "top", functions=(lambda x: start + speed * x, lambda nose: (nose - start) / speed)
+        "top",
+        functions=(
+            lambda time: start + speed * np.asarray(time, dtype=float),
+            lambda nose: (np.asarray(nose, dtype=float) - start) / speed,
+        ),
     )
     above.set_xlabel("nose of the train [m]", labelpad=2)
 

@@ -109,7 +109,9 @@ def _computed(
     n_threads: int,
 ) -> xr.Dataset:
     """Passages of a batch, of which the thinned histories are kept."""
-    passages = simulate(config, gains, histories=True, track_seeds=seeds, n_threads=n_threads)
+    passages = simulate(
+        config, gains, histories="responses", track_seeds=seeds, n_threads=n_threads
+    )
     too_fast = np.count_nonzero(passages["status"] == STEP_TOO_LARGE)
     if too_fast:
         raise UserError(

@@ -111,8 +111,7 @@ def density_in_time(
 
     References
     ----------
-    Li, Chen, Stochastic Dynamics of Structures (2009), ch. 7; docs/theory/pdem.md, eqs. (11) and
-    (12).
+    Li, Chen, Stochastic Dynamics of Structures (2009), ch. 7; docs/theory/pdem.md, eq. (12).
 
     Examples
     --------
