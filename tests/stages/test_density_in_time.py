@@ -21,7 +21,7 @@ LEVELS = (0.1, 0.01, 0.001)
 
 
 class FormulaHistories:
-    """Stands in for `maglev.simulate`: every response is A sin(wt), its extreme A."""
+    """Stands in for `maglev.simulate`: A sin(wt), or -A sin²(wt), of extreme A."""
 
     def __init__(self, status=2):
         self.batches, self.status = [], status
@@ -37,7 +37,9 @@ class FormulaHistories:
         made["lost_t"] = ("sample", np.where(lost, 0.7, np.nan))
         for k, name in enumerate(RESPONSES):
             extreme = synthetic.extremes(standard)[:, k]
-            history = extreme[:, None] * np.sin(2 * np.pi / PERIOD * TIME)
+            swing = np.sin(2 * np.pi / PERIOD * TIME)
+            swing = -(swing**2) if name == "girder_acceleration_y" else swing
+            history = extreme[:, None] * swing
             history[lost] = np.where(TIME < 0.7, history[lost], np.nan)
             of_car = name.startswith("car_body")
             dims = ("sample", "car", "t") if of_car else ("sample", "t")
@@ -103,6 +105,15 @@ def test_the_end_of_the_first_passage_is_the_distribution_of_the_extreme(train, 
     below = extreme[:, None] < limits()["limit"][0].to_numpy()
     exact = (below & (drawn[:, :1] > synthetic.BORDER)).mean(axis=0)
     assert_allclose(at["reliability_of_extreme"], exact, atol=0.006)
+
+
+def test_a_barrier_stands_on_either_side(train, tmp_path):
+    parameters = config(in_time={"n_times": 60, "responses": ["girder_acceleration_y"]})
+    found = made(tmp_path, given=False, parameters=parameters).isel(response=0)
+    assert (found["reliability_of_extreme"] < 0.97).any()
+    end = found["reliability_of_points"].isel(t=-1)
+    assert_allclose(end, found["reliability_of_extreme"], rtol=1e-13)
+    assert np.abs(found["reliability_error"]).max() < 0.01
 
 
 def test_losses_leave_when_they_happen_and_the_density_holds_the_rest(train, tmp_path):
@@ -180,6 +191,9 @@ def test_a_path_of_the_model_reaches_its_extreme():
     for name in RESPONSES:
         path = histories._path(passages, name, ends)
         assert_allclose(np.abs(path).max(axis=1), passages[name], rtol=1e-12, err_msg=name)
+        interval = -(-np.abs(path).argmax(axis=1) // 3)
+        at = passages[f"{name}_t"].to_numpy() / float(passages["t"][0])
+        assert ((ends[interval - 1] <= at) & (at <= ends[interval])).all(), name
         plain = thinned(np.pad(np.abs(passages[f"{name}_history"].to_numpy().reshape(2, -1)),
                                ((0, 0), (1, 0))), ends, [np.nan] * 2, [np.nan] * 2)  # fmt: skip
         # records a millisecond apart miss little of a peak
