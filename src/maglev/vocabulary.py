@@ -20,7 +20,17 @@ Response = Literal[
 """A response; its extreme is the result of a passage."""
 
 RESPONSES: tuple[Response, ...] = get_args(Response)
-"""The responses in the order of ``response`` in files and arrays."""
+"""The responses in the order in which they are shown."""
+
+PAPER_RESPONSES: tuple[Response, ...] = (
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+    "car_body_acceleration_z",
+    "car_body_acceleration_y",
+)
+"""The responses that the paper judges a passage by."""
 
 RecordedResponse = Literal[
     "girder_displacement_z",
@@ -137,6 +147,9 @@ where none is given, its mean and as many deviations as a normal variate has at 
 
 SOURCES = ("paper", "ours")
 """Source of a number."""
+
+LOST = "lost"
+"""The limit state that is always there: levitation is lost."""
 
 TRACK_PARTS = ("gains_only", "track_only", "other_track", "other_gains")
 """Further runs of a case whose baseline has gains i on track i: gains i on the configured track;

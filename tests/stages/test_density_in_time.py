@@ -11,7 +11,7 @@ from scipy import stats
 from maglev import datasets, simulate
 from maglev.config import from_mapping
 from maglev.stage import named
-from maglev.stages import density_in_time, histories, representative_points
+from maglev.stages import density_in_time, histories, representative_points, runs
 from maglev.uncertainty.in_time import thinned
 from maglev.vocabulary import BARRIER_SOURCES, RESPONSES, STEP_TOO_LARGE
 
@@ -26,8 +26,9 @@ class FormulaHistories:
     def __init__(self, status=2):
         self.batches, self.status = [], status
 
-    def __call__(self, config, gains, histories, *, track_seeds=None, n_threads=1):
+    def __call__(self, config, gains, *, histories, values=None, track_seeds=None, n_threads=1):
         self.batches.append(len(gains))
+        gains = gains[:, :4]
         standard = (gains / np.array(config.gains.as_row) - 1) / 0.1
         made = synthetic.runs(standard, loses=True).drop_vars(
             ["standard", "probability", "track_seed", "parameter"]
@@ -55,7 +56,7 @@ class FormulaHistories:
 @pytest.fixture
 def train(monkeypatch):
     one = FormulaHistories()
-    monkeypatch.setattr(histories, "simulate", one)
+    monkeypatch.setattr(runs, "simulate", one)
     monkeypatch.setattr(histories, "BATCH", 50)
     return one
 
@@ -77,7 +78,7 @@ def limits(given=True):
     by_level = ("response", "failure_probability")
     return xr.Dataset(
         {"limit": (by_level, limit), "limit_status": (by_level, status)},
-        coords={"response": np.arange(6), "failure_probability": list(LEVELS)},
+        coords={"response": list(RESPONSES), "failure_probability": list(LEVELS)},
     )
 
 
@@ -167,7 +168,7 @@ def test_without_limits_barriers_stand_on_the_extremes_mean_and_deviation(train,
 
 def test_a_step_that_is_too_large_for_some_gains_is_refused(train, tmp_path):
     train.status = STEP_TOO_LARGE
-    with pytest.raises(ValueError, match=r"too large for the gains of .* of 50 representative"):
+    with pytest.raises(ValueError, match=r"too large for the gains of .* of 50 samples"):
         made(tmp_path)
 
 

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 
 from maglev.arrays import FloatArray
 from maglev.figures import labels, style
-from maglev.vocabulary import RESPONSES
 
 _COLUMNS = 2
 _DECADES = 3
@@ -45,7 +44,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     for place, name in enumerate(names):
         row, column = divmod(place, n_columns)
         own = axes[3 * row : 3 * row + 3, column]
-        shown, at = labels.SHOWN[RESPONSES.index(name)], data.sel(response=name)
+        shown, at = labels.shown(name), data.sel(response=name)
         of_cars = ", largest of the cars" if name.startswith("car_body") else ""
         for k, (draw, words) in enumerate(
             (
@@ -122,8 +121,7 @@ def _density(axis: Axes, at: xr.Dataset, shown: labels.Shown) -> None:
     axis.set_ylabel(f"deviation [{unit}]")
     axis.grid(visible=False)
     bar = axis.figure.colorbar(mesh, ax=axis, extend="both", pad=0.02)
-    inverse = "1/µm" if unit == "µm" else "s²/m"
-    bar.set_label(f"density [{inverse}]")
+    bar.set_label("density [1/µm]" if unit == "µm" else shown.density_axis)
 
 
 def _top(density: FloatArray, deviation: FloatArray) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
@@ -67,6 +68,41 @@ class Passages:
     body_y_history: FloatArray
     gap_history: FloatArray
     current_history: FloatArray
+
+
+def in_their_order(parts: Sequence[Passages], rows: Sequence[IntArray]) -> Passages:
+    """Passages of one set from those of its groups, which may have different trains.
+
+    Parameters
+    ----------
+    parts
+        Passages of each group.
+    rows : group of (sample,)
+        Numbers of their samples.
+
+    Returns
+    -------
+    passages
+        Of all samples in order; a car that a train does not have is NaN.
+    """
+    order = np.argsort(np.concatenate(rows), kind="stable")
+
+    def joined(name: str) -> npt.NDArray:
+        arrays = [getattr(part, name) for part in parts]
+        if name == "time":
+            return arrays[0]
+        longest = tuple(np.max([one.shape[1:] for one in arrays], axis=0))
+        padded = [
+            np.pad(
+                one,
+                [(0, 0), *((0, most - n) for most, n in zip(longest, one.shape[1:], strict=True))],
+                constant_values=np.nan if one.dtype.kind == "f" else 0,
+            )
+            for one in arrays
+        ]
+        return np.concatenate(padded)[order]
+
+    return Passages(**{field.name: joined(field.name) for field in fields(Passages)})
 
 
 def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4) -> FloatArray:

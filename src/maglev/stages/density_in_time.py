@@ -16,7 +16,7 @@ from maglev.mechanics.course import course
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.histories import stored_histories
-from maglev.stages.points import case_of, track_seeds
+from maglev.stages.points import others_at, seeds_of_tracks
 from maglev.stages.reads import RUNS_OF_CASE
 from maglev.uncertainty.gdee import FirstPassage, first_passage
 from maglev.uncertainty.in_time import DensityInTime, density_in_time, quantiles_in_time
@@ -28,7 +28,6 @@ from maglev.vocabulary import (
     GIVEN,
     LIMIT_STATUS,
     METHODS,
-    RESPONSES,
     RecordedResponse,
 )
 
@@ -88,7 +87,8 @@ def dataset(
         config.study.in_time.responses,
         config.study.in_time.n_times,
         store,
-        track_seeds=track_seeds(config, n, "in_time") if _on_tracks(config, case) else None,
+        values=others_at(config, case, representative_points["parameter_value"].to_numpy()),
+        track_seeds=seeds_of_tracks(config, case, n, "in_time"),
         n_threads=n_threads,
     )
     method = [name for name in METHODS if name in limits][-1]
@@ -110,11 +110,6 @@ def dataset(
         "the scheme's kernel reaches a barrier early; reliability_of_points has none"
     )
     return result
-
-
-def _on_tracks(config: Config, case: str) -> bool:
-    """Whether each sample of a case has an irregularity of its own."""
-    return case_of(config, case).random_track
 
 
 def _until(path: FloatArray) -> IntArray:
@@ -182,7 +177,7 @@ def _barriers(
     config: Config, limits: xr.Dataset, name: RecordedResponse, extreme: HeldPart
 ) -> tuple[FloatArray, IntArray]:
     """Barriers (level,) of a response and what they are."""
-    at = _by_name(limits).sel(response=name)
+    at = limits.sel(response=name)
     levels = np.array(config.study.failure_probability)
     mean = extreme.probability @ extreme.values
     deviation = np.sqrt(extreme.probability @ (extreme.values - mean) ** 2)
@@ -190,14 +185,6 @@ def _barriers(
     barrier = np.where(given, at["limit"], mean + norm.isf(levels) * deviation)
     source = np.where(given, *(BARRIER_SOURCES.index(one) for one in BARRIER_SOURCES))
     return barrier, source
-
-
-def _by_name(found: xr.Dataset) -> xr.Dataset:
-    """A file whose responses are called by their names."""
-    places = found["response"].to_numpy()
-    if places.dtype.kind not in "iu":
-        return found
-    return found.assign_coords(response=[RESPONSES[place] for place in places])
 
 
 def _say(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -18,13 +18,11 @@ import xarray as xr
 
 from maglev import datasets
 from maglev.arrays import FloatArray, IntArray
-from maglev.errors import UserError
 from maglev.fingerprint import code_of
 from maglev.parameters import Config
-from maglev.simulation import simulate
-from maglev.stages.runs import BATCH, content, key_of
+from maglev.stages.runs import BATCH, content, key_of, simulated
 from maglev.uncertainty.in_time import thinned
-from maglev.vocabulary import GAINS, STEP_TOO_LARGE, RecordedResponse
+from maglev.vocabulary import GAINS, RecordedResponse
 
 _LOG = logging.getLogger(__name__)
 
@@ -42,10 +40,12 @@ def stored_histories(
     n_times: int,
     store: str | Path,
     *,
+    values: Mapping[str, FloatArray] | None = None,
     track_seeds: IntArray | None = None,
     n_threads: int = 1,
 ) -> xr.Dataset:
-    """Thinned histories at given gains; only batches missing from the store are computed.
+    """Thinned histories at given gains and values; batches found in the store are not computed.
+
 
     Parameters
     ----------
@@ -59,6 +59,8 @@ def stored_histories(
         Times that are kept, at most, from the start to the end of a passage.
     store
         Folder of the store.
+    values
+        Further quantities (sample,) that differ from run to run, by their dotted keys [SI].
     track_seeds : (sample,), optional
         Seed of each sample's irregularity; that of the configuration if not given.
     n_threads
@@ -74,16 +76,21 @@ def stored_histories(
     UserError
         If the time step is too large for some gains, or as `maglev.simulate`.
     """
-    key = key_of(content(config), _code(), list(responses), n_times)
+    varied = {name: (values or {})[name] for name in sorted(values or {})}
+    key = key_of(content(config, varied), _code(), list(responses), n_times)
     folder = Path(store) / "histories" / key
     began, parts = time.perf_counter(), []
     for start in range(0, len(gains), BATCH):
         rows = slice(start, start + BATCH)
         seeds = None if track_seeds is None else track_seeds[rows]
-        path = folder / f"{_name(gains[rows], seeds)}.nc"
+        own = {name: column[rows] for name, column in varied.items()}
+        path = folder / f"{_name(np.column_stack([gains[rows], *own.values()]), seeds)}.nc"
         if not path.is_file():
-            computed = _computed(config, gains[rows], seeds, responses, n_times, n_threads)
-            datasets.write(computed, path, "histories", config=content(config), code=_code())
+            passages = simulated(config, gains[rows], own, seeds, n_threads, "responses")
+            computed = _thinned(passages, seeds, responses, n_times)
+            datasets.write(
+                computed, path, "histories", config=content(config, varied), code=_code()
+            )
         parts.append(datasets.read(path, "histories"))
         done = min(start + BATCH, len(gains))
         _LOG.info("%d of %d, %.0f s", done, len(gains), time.perf_counter() - began)
@@ -92,32 +99,21 @@ def stored_histories(
     return whole.assign_coords(sample=np.arange(len(gains)))
 
 
-def _name(gains: FloatArray, seeds: IntArray | None) -> str:
-    """Name of the file of a batch: a hash of its gains and seeds."""
-    content = np.ascontiguousarray(gains, dtype="<f8").tobytes()
+def _name(numbers: FloatArray, seeds: IntArray | None) -> str:
+    """Name of the file of a batch: a hash of its numbers (sample, number) and seeds."""
+    content = np.ascontiguousarray(numbers, dtype="<f8").tobytes()
     if seeds is not None:
         content += seeds.astype("<i8").tobytes()
     return hashlib.sha256(content).hexdigest()[:16]
 
 
-def _computed(
-    config: Config,
-    gains: FloatArray,
+def _thinned(
+    passages: xr.Dataset,
     seeds: IntArray | None,
     responses: Sequence[RecordedResponse],
     n_times: int,
-    n_threads: int,
 ) -> xr.Dataset:
-    """Passages of a batch, of which the thinned histories are kept."""
-    passages = simulate(
-        config, gains, histories="responses", track_seeds=seeds, n_threads=n_threads
-    )
-    too_fast = np.count_nonzero(passages["status"] == STEP_TOO_LARGE)
-    if too_fast:
-        raise UserError(
-            f"passage.time_step is too large for the gains of {too_fast} of {len(gains)} "
-            "representative points: motions would grow by the step alone; take a smaller step"
-        )
+    """Thinned histories of some passages, as a file of the store holds them."""
     record = passages["t"].to_numpy()
     t = np.concatenate([[0.0], record])
     ends = np.unique(np.linspace(0, record.size, min(n_times, t.size)).round().astype(int))
