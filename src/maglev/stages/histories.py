@@ -46,7 +46,6 @@ def stored_histories(
 ) -> xr.Dataset:
     """Thinned histories at given gains and values; batches found in the store are not computed.
 
-
     Parameters
     ----------
     config
