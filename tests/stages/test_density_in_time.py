@@ -28,6 +28,7 @@ class FormulaHistories:
 
     def __call__(self, config, gains, *, histories, values=None, track_seeds=None, n_threads=1):
         self.batches.append(len(gains))
+        self.given = {"values": values, "seeds": track_seeds}
         gains = gains[:, :4]
         standard = (gains / np.array(config.gains.as_row) - 1) / 0.1
         made = synthetic.runs(standard, loses=True).drop_vars(
@@ -147,6 +148,29 @@ def test_a_batch_is_computed_once_whatever_came_between(train, tmp_path):
     next((tmp_path / "store").rglob("*.nc")).unlink()  # as if it had been interrupted
     xr.testing.assert_identical(made(tmp_path / "store"), first)
     assert sum(train.batches) == 450
+
+
+def test_any_random_quantity_and_a_track_of_its_own_reach_the_model(train, tmp_path):
+    law = {"law": "uniform", "low": "29 t", "high": "39 t"}
+    parameters = from_mapping(
+        {
+            "study": {"n_representative": 64, "n_counting": 16384, "in_time": {"n_times": 20}},
+            "cases": {
+                "validation": {"random": {"train.car_body.mass": law}},
+                "moving": {"track": "random", "methods": ["mcm"]},
+            },
+        }
+    )
+    drawn = representative_points.dataset(parameters, "validation")
+    density_in_time.dataset(parameters, drawn, {"asm": limits()}, "validation", tmp_path)
+    assert train.given["seeds"] is None
+    assert_array_equal(
+        train.given["values"]["train.car_body.mass"],
+        drawn["parameter_value"].sel(parameter="train.car_body.mass")[50:],
+    )
+    drawn = representative_points.dataset(parameters, "moving")
+    density_in_time.dataset(parameters, drawn, {"mcm": limits()}, "moving", tmp_path)
+    assert np.unique(train.given["seeds"]).size == 14
 
 
 def test_no_number_depends_on_the_size_of_a_batch(train, tmp_path, monkeypatch):
