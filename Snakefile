@@ -64,8 +64,8 @@ rule all:
 rule truth:
     input:
         [
-            place(stage, case=case, method=BASELINE)
+            file_of(stage, case=case, method=BASELINE)
             for stage in ("baseline", "density", "limits")
-            for case in parameters.cases
+            for case in CASES
         ],
-        place("statistics_check", scope="statistics_truth"),
+        file_of("statistics_check", scope="statistics_truth"),

@@ -10,7 +10,7 @@ import yaml
 from jsonschema import Draft202012Validator
 from numpy.testing import assert_allclose
 
-from maglev import ConfigError, catalogue, load_config, parameters
+from maglev import ConfigError, catalogue, load_config, units
 from maglev.config import config_text, from_mapping, overlay
 from maglev.measurements import load_measurements
 from maglev.parameters import Config
@@ -76,7 +76,13 @@ KNOWN = " or ".join(", ".join(f"'{name}'" for name in RESPONSES).rsplit(", ", 1)
         ),
         (
             "cases: {validation: {coefficient_of_variation: 0}}",
-            "cases.validation.coefficient_of_variation must be greater than 0, got 0",
+            "cases.validation.coefficient_of_variation is no longer a key: write it into the law "
+            "of each quantity, such as random: {gains.suspension_proportional: {law: normal, "
+            "coefficient_of_variation: 0.1}}",
+        ),
+        (
+            "cases: {a: {random: {passage.speed: {coefficient_of_variation: 0}}}}",
+            "cases.a.random.passage.speed.coefficient_of_variation must be greater than 0, got 0",
         ),
         (
             "cases: {validation: {methods: [mcm, amc]}}",
@@ -84,14 +90,44 @@ KNOWN = " or ".join(", ".join(f"'{name}'" for name in RESPONSES).rsplit(", ", 1)
         ),
         (
             "cases: {validation: {random_gains: [suspension]}}",
-            "cases.validation.random_gains.0 must be 'suspension_proportional', "
-            "'suspension_derivative', 'guidance_proportional' or 'guidance_derivative', "
-            "got 'suspension'",
+            "cases.validation.random_gains is no longer a key: write the gains with their laws "
+            "under random, such as random: {gains.suspension_proportional: {law: normal, "
+            "coefficient_of_variation: 0.1}}",
         ),
         (
-            "cases: {validation: {correlation: 0.5}}",
-            "cases.validation.correlation is not supported: the random gains are independent; "
-            "leave it out",
+            "cases: {a: {random: {train.car_body.weight: {coefficient_of_variation: 0.1}}}}",
+            "cases.a.random.train.car_body.weight is no key of the configuration: there is no "
+            "'weight'",
+        ),
+        (
+            "cases: {a: {random: {irregularity.sides: {coefficient_of_variation: 0.1}}}}",
+            "cases.a.random.irregularity.sides cannot be random: its value is no number, but "
+            "'shared'",
+        ),
+        (
+            "cases: {a: {random: {study.n_population: {coefficient_of_variation: 0.1}}}}",
+            "cases.a.random.study.n_population cannot be random; the sections whose numbers can "
+            "are train, guideway, irregularity, gains, control, passage, such as "
+            "train.car_body.mass",
+        ),
+        (
+            "cases: {a: {set: {passage.speed: 90 m/s}, "
+            "random: {passage.speed: {coefficient_of_variation: 0.01}}}}",
+            "cases.a.passage.speed is both set and random; leave one of them out",
+        ),
+        (
+            "cases: {a: {random: {train.n_cars: {coefficient_of_variation: 0.1}}}}",
+            "cases.a.random.train.n_cars: it counts, so that its law must be discrete, of integers",
+        ),
+        (
+            "cases: {a: {random: {train.car_body.mass: {law: uniform, low: 29 t, high: 39}}}}",
+            "cases.a.random.train.car_body.mass: high must carry its unit, such as '39.0 kg'",
+        ),
+        (
+            "cases: {a: {correlation: [[gains.suspension_proportional, passage.speed, 0.5]]}}",
+            "cases.a.correlation: passage.speed is not random; the random ones are "
+            "gains.suspension_proportional, gains.suspension_derivative, "
+            "gains.guidance_proportional, gains.guidance_derivative",
         ),
         (
             "cases: {validation: {n_span: 4}}",
@@ -100,14 +136,25 @@ KNOWN = " or ".join(", ".join(f"'{name}'" for name in RESPONSES).rsplit(", ", 1)
         ),
         (
             "cases: {validation: {random_track: true}}",
-            "cases.validation.random_track works with the method mcm only, got osm, asm_paper, "
-            "asm: a surrogate of the gains cannot know the track of each sample",
+            "cases.validation.random_track is no longer a key: write track: random",
         ),
         (
-            "cases: {validation: {coefficient_of_variation: 0.8}}",
-            "cases.validation.coefficient_of_variation = 0.8 leaves only 36 % of the gains "
-            "statically stable (k_p > i0/delta0, more for the group half, k_d >= 0), expected at "
-            "least half; lower it, raise the mean gains or take the case away with null",
+            "cases: {validation: {track: 1}}",
+            "cases.validation.track must be fixed, random or a number of tracks from 2, got 1",
+        ),
+        (
+            "cases: {a: {random: {gains.suspension_proportional: {law: lognormal, "
+            "mean: 2000 A/m, coefficient_of_variation: 0.1}}}}",
+            "cases.a.random leaves only 1 % of the gains statically stable (k_p > i0/delta0, more "
+            "for the group half, k_d >= 0), expected at least half; lower the variation, raise the "
+            "mean gains or take the case away with null",
+        ),
+        (
+            "only: [mine]",
+            "only names 'mine', which is no case; there are: validation, "
+            "only_suspension_proportional, only_suspension_derivative, only_guidance_proportional, "
+            "only_guidance_derivative, all_gains, cov_004, cov_006, cov_008, cov_010, cov_012, "
+            "cov_014, group_ends, group_half, group_lumped, lag_2ms",
         ),
         (
             "cases: {New: {}}",
@@ -224,9 +271,9 @@ def test_a_speed_may_be_given_in_any_unit_of_speed():
     assert_allclose(from_mapping({"passage": {"speed": "432 km/h"}}).passage.speed, 120)
 
 
-@pytest.mark.parametrize(("unit", "si"), parameters._FACTORS)
+@pytest.mark.parametrize(("unit", "si"), units._FACTORS)
 def test_the_short_cut_for_common_units_agrees_with_the_library(unit, si):
-    times, over = parameters._FACTORS[unit, si]
+    times, over = units._FACTORS[unit, si]
     exact = pint.UnitRegistry().Quantity(430.0, unit).to(si).magnitude
     assert_allclose(430.0 * times / over, exact, rtol=1e-15)
 

@@ -35,7 +35,7 @@ cases:
   group_half: null
   group_lumped: null
   lag_2ms: {n_spans: 1, n_samples: 2}
-  random_track: {n_spans: 1, methods: [mcm], n_samples: 2, random_track: true}
+  random_track: {n_spans: 1, methods: [mcm], n_samples: 2, track: random}
 """
 
 

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 from pydantic.fields import FieldInfo
 
 from maglev.datasets import CONVENTIONS, LAYOUTS, TEXT, VARIABLES, Variable
-from maglev.parameters import CONFIDENCE, SOURCES, Config, Parameters
+from maglev.parameters import CONFIDENCE, SOURCES, Config, Law, Parameters
 from maglev.stage import flag, stages, summaries
 from maglev.vocabulary import METHODS
 
@@ -109,6 +109,10 @@ def _config_lines(
                 yield ""
             yield from _commented(f"{pad}{name}:", _summary(type(value)), pad)
             yield from _config_lines(value, _origins(field), indent + 1)
+        elif isinstance(value, Mapping) and _named_section(field) is Law:
+            yield from _commented(f"{pad}{name}:", field.description or "", pad)
+            for key, law in value.items():
+                yield f"{pad}  {key}: {_yaml_value(law.quantities())}"
         elif isinstance(value, Mapping) and _named_section(field) is not None:
             yield ""
             yield from _commented(f"{pad}{name}:", field.description or "", pad)

@@ -293,7 +293,8 @@ def write(
         "demonstration": demonstration,
         "study": {"confidence": 0.95},
         "control": control or circuits(),
-        "cases": {case: {"coefficient_of_variation": variation, "n_spans": 5}},
+        "guideway": {"n_spans": 5},
+        "cases": {case: {"random": {"gains.a": {"coefficient_of_variation": variation}}}},
     }
     attributes = {"case": case} | ({} if method is None else {"method": method})
     datasets.write(dataset.assign_attrs(attributes), path, layout, config=config, code="abc")

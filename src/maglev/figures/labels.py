@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -121,7 +122,7 @@ METHOD = {"mcm": "MCM", "osm": "OSM", "asm_paper": "ASM (paper)", "asm": "ASM (o
 """The methods in short."""
 
 PDEM = {"mcm": "MCM", "osm": "OSM-PDEM", "asm_paper": "ASM-PDEM (paper)", "asm": "ASM-PDEM (ours)"}
-"""The same for what is found with the density evolution."""
+"""The methods in short, with the density evolution."""
 
 METHOD_STYLE: dict[str, style.Look] = {
     "mcm": {"color": "#000000", "ls": "-"},
@@ -157,16 +158,22 @@ def case_name(data: xr.Dataset) -> str:
 def settings(design: xr.Dataset) -> tuple[float, int]:
     """Coefficient of variation and number of spans of the case of a design or a set of runs.
 
+    The coefficient is NaN where the random quantities of the case have several or none.
+
     Raises
     ------
     UserError
         If the file does not say them.
     """
     try:
-        of_case = json.loads(design.attrs["config"])["cases"][design.attrs["case"]]
-        return float(of_case["coefficient_of_variation"]), int(of_case["n_spans"])
+        config = json.loads(design.attrs["config"])
+        laws = config["cases"][design.attrs["case"]]["random"].values()
+        n_spans = int(config["guideway"]["n_spans"])
     except (KeyError, TypeError):
         raise UserError("the file must say its case and how it was configured") from None
+    variations = {law.get("coefficient_of_variation") for law in laws}
+    only = variations.pop() if len(variations) == 1 else None
+    return float("nan") if only is None else float(only), n_spans
 
 
 def confidence(data: xr.Dataset) -> str:
@@ -289,7 +296,8 @@ def of_runs(name: str, n_runs: SupportsInt, lost_probability: SupportsFloat) -> 
 def of_settings(design: xr.Dataset) -> str:
     """Title of a legend: coefficient of variation and number of spans."""
     variation, n_spans = settings(design)
-    return f"random ({n_spans} spans, coefficient of variation {variation:.2f})"
+    by = "" if math.isnan(variation) else f", coefficient of variation {variation:.2f}"
+    return f"random ({n_spans} spans{by})"
 
 
 def percent(share: float) -> str:

@@ -1,4 +1,4 @@
-"""Which random quantity matters for which response: Sobol' indices of the surrogate."""
+"""Sobol' indices of the surrogate: the effect of each random quantity on each response."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         The figure and the numbers in it.
     """
     keys = labels.parameters_of(data)
-    place = np.arange(len(keys))[::-1]
+    row = np.arange(len(keys))[::-1]
     colours = [labels.parameter_colour(key) for key in keys]
     fig, panels = labels.response_panels(data, 3.9 * max(1.0, len(keys) / 6))
     for response, axis, _ in panels:
@@ -34,7 +34,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
             low, high = (at[f"{name}_{end}"].to_numpy() for end in ("low", "high"))
             reach = np.abs([middle - low, high - middle])
             axis.barh(
-                place + shift,
+                row + shift,
                 middle,
                 height=0.36,
                 color=colours if filled else "white",
@@ -43,7 +43,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
                 xerr=reach,
                 error_kw={"elinewidth": 0.8, "capsize": 1.5, "ecolor": "#000000"},
             )
-        axis.set_yticks(place, [labels.parameter_name(key) for key in keys])
+        axis.set_yticks(row, [labels.parameter_name(key) for key in keys])
         axis.grid(visible=False, axis="y")
         axis.set_xlim(0, 1.05)
         error = float(at["leave_one_out_error"])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
@@ -33,12 +34,12 @@ class Passages:
     gap_min, gap_max, current_max : (sample, kind)
         Of suspension and guidance [m, m, A].
     status : (sample,)
-        How the passage ended: 0 completed, 1 contact, 2 gap lost, 3 not finite, 4 not judged, as
+        End of the passage: 0 completed, 1 contact, 2 gap lost, 3 not finite, 4 not judged, as
         the step is too large for the gains.
     lost_time : (sample,)
         When levitation was lost [s]; NaN where it was not.
     lost_magnet : (sample,)
-        Where, in the train's table of magnets; -1 where it was not.
+        Magnet that lost it, a row of the train's table; -1 where none did.
     time : (record,)
         Elapsed time of the recorded steps [s].
     girder_history : (sample, response, record)
@@ -69,6 +70,41 @@ class Passages:
     current_history: FloatArray
 
 
+def in_their_order(parts: Sequence[Passages], rows: Sequence[IntArray]) -> Passages:
+    """Passages of one set from those of its groups, which may have different trains.
+
+    Parameters
+    ----------
+    parts
+        Passages of each group.
+    rows : group of (sample,)
+        Numbers of their samples.
+
+    Returns
+    -------
+    passages
+        Of all samples in order; a car that a train does not have is NaN.
+    """
+    order = np.argsort(np.concatenate(rows), kind="stable")
+
+    def joined(name: str) -> npt.NDArray:
+        arrays = [getattr(part, name) for part in parts]
+        if name == "time":
+            return arrays[0]
+        longest = tuple(np.max([one.shape[1:] for one in arrays], axis=0))
+        padded = [
+            np.pad(
+                one,
+                [(0, 0), *((0, most - n) for most, n in zip(longest, one.shape[1:], strict=True))],
+                constant_values=np.nan if one.dtype.kind == "f" else 0,
+            )
+            for one in arrays
+        ]
+        return np.concatenate(padded)[order]
+
+    return Passages(**{field.name: joined(field.name) for field in fields(Passages)})
+
+
 def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4) -> FloatArray:
     """Return the gains as (sample, 8) doubles.
 
@@ -78,12 +114,17 @@ def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4)
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d; then suspension k_a [A s²/m],
         k_i [A/(m s)], guidance k_a, k_i.
     further : (4,)
-        The last four where only four are given, from `maglev.parameters.Gains.further`.
+        Values of the last four where only four are given, from `maglev.parameters.Gains.further`.
 
     Raises
     ------
     UserError
         If they have another shape, no sample, or a value that is not finite.
+
+    Examples
+    --------
+    >>> checked_gains([[3500.0, 17.5, 4500.0, 17.5]]).shape
+    (1, 8)
     """
     array = np.asarray(gains, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] not in (4, 8):
@@ -134,6 +175,11 @@ def acceleration_filter(passage: Passage, time_step: float) -> FloatArray:
     References
     ----------
     docs/theory/integration.md, eq. 8.
+
+    Examples
+    --------
+    >>> acceleration_filter(Passage(), 0.5e-3).shape  # eighth order
+    (4, 6)
     """
     band = passage.acceleration_band
     if band is None:

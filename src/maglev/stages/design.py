@@ -1,9 +1,9 @@
 """Designs: training runs of a surrogate, in one stage or in adaptive rounds.
 
 An adaptive design is a fold over its rounds.  Each round is written to the store as a small file of
-its own before the next begins; to resume is to read them once more.  When to stop is decided from
-this history alone, so another threshold or another largest number of runs continues or shortens
-what is stored, without a run of the model.
+its own before the next begins; to resume is to read them once more.  This history alone decides
+when to stop, so another threshold or another largest number of runs continues or shortens the
+stored design, without a run of the model.
 """
 
 from __future__ import annotations
@@ -73,9 +73,9 @@ def dataset(
     initial_points
         Layout ``points``: the first design.
     candidate_points
-        Layout ``points``: what the rounds of an adaptive method choose from.
+        Layout ``points``: candidates of the rounds of an adaptive method.
     baseline
-        Layout ``runs``: what the surrogate of each round is compared with.
+        Layout ``runs``: the surrogate of each round is compared with it.
     store
         Folder of the store of runs and rounds.
     n_threads
@@ -150,7 +150,7 @@ class _Design:
 
     def _content(self) -> dict[str, object]:
         """All settings that decide the rounds, without stopping rule and final surrogate."""
-        chosen = case_of(self.config, self.case)
+        chosen = case_of(self.config, self.case).quantities()
         quantities = self.settings.quantities()
         later = {"threshold", "n_rounds", "n_largest", "n_runs", "responses"}
         if self.method == "asm":
@@ -158,8 +158,9 @@ class _Design:
         return {
             **content(self.config.of_case(self.case)),
             "gains": self.config.gains.quantities(),
-            "coefficient_of_variation": chosen.coefficient_of_variation,
-            "random_gains": list(chosen.random_gains),
+            "random": list(chosen["random"].items()),
+            "correlation": chosen["correlation"],
+            "track": chosen["track"],
             "failure_probability": list(self.levels),
             "responses": list(self.responses),
             self.method: {k: v for k, v in quantities.items() if k not in later},

@@ -11,7 +11,7 @@ from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Stage
 from maglev.stages.extremes import coordinates, extremes
-from maglev.stages.points import marginals, track_seeds
+from maglev.stages.points import marginals, seeds_of_line
 from maglev.stages.randomness import generator
 from maglev.stages.reads import RESPONSES_OF_STUDY, RUNS_OF_CASE
 from maglev.stages.runs import runs
@@ -52,7 +52,7 @@ def dataset(config: Config, case: str, store: str | Path, n_threads: int = 1) ->
     settings = config.study.tracks
     n_tracks, n = settings.n_tracks, settings.n_gains
     points = sobol_points(marginals(config, case), n, generator(config.seed, "gains on tracks"))
-    seeds = np.concatenate([[config.seed], track_seeds(config, n_tracks - 1, "tracks")])
+    seeds = seeds_of_line(config, n_tracks)
     whole = runs(
         config,
         case,
