@@ -1146,6 +1146,14 @@ class LimitState(Parameters):
         None, description="how far the limit can be trusted"
     )
 
+    @field_validator("limit", mode="before")
+    @classmethod
+    def _read_number(cls, limit: Any) -> Any:
+        """Take a plain number that YAML leaves as text, such as 25e-5."""
+        if isinstance(limit, str) and re.fullmatch(r"[-+]?[0-9.]+([eE][-+]?[0-9]+)?", limit):
+            return float(limit)
+        return limit
+
     @property
     def threshold(self) -> float:
         """The limit in the SI unit of the response; NaN where there is none."""
