@@ -258,6 +258,37 @@ def load_config(*paths: str | Path) -> Config:
     return from_mapping(mapping)
 
 
+def layered(
+    paths: Sequence[str | Path], over: Mapping[str, Any], lowest: str | Path
+) -> dict[str, Any]:
+    """Values of configuration files laid over each other, as the workflow is given them.
+
+    Parameters
+    ----------
+    paths
+        Files in rising order; names of files in each are relative to it.
+    over
+        Values that lie over all files.
+    lowest
+        File below all others, unless one of them says what it extends.
+
+    Returns
+    -------
+    mapping
+        For `from_mapping`.
+
+    Raises
+    ------
+    ConfigError
+        As `read_overlays`.
+    """
+    near = [os.path.relpath(path) for path in paths]
+    below = {} if any("extends" in read_yaml(path) for path in near) else read_overlays(lowest)
+    for path in near:
+        below = overlay(below, read_overlays(path))
+    return overlay(below, over)
+
+
 def config_text(mapping: Mapping[str, Any], directory: str | Path = ".") -> str:
     """Text of a configuration file in a given directory.
 
