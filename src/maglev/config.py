@@ -258,7 +258,7 @@ def sample_values(path: str | Path) -> list[str | float]:
     found = re.fullmatch(r"[^\[\]]*[^\W\d][^\[\]]*(\[(?P<unit>[^\[\]]+)\])?", heading)
     if found is None:
         raise ConfigError(
-            f"{path}, line 1: expected a heading such as 'mass [t]' over the values, got '{heading}'"
+            f"{path}, line 1: expected a heading such as 'mass [t]', got '{heading}'"
         )
     unit = (found["unit"] or "").strip()
     values: list[str | float] = []
