@@ -114,6 +114,11 @@ def quantity(
     )
 
 
+def _lists(value: Any) -> Any:
+    """A value with lists in place of tuples, as a file has them."""
+    return [_lists(one) for one in value] if isinstance(value, list | tuple) else value
+
+
 _IN_SI = {"numbers": "SI"}
 """Context of a validation whose numbers are in SI and carry no unit."""
 
@@ -167,13 +172,13 @@ class Parameters(BaseModel):
                 out[name] = [item.quantities() for item in value]
             elif isinstance(value, Mapping):
                 out[name] = {
-                    key: item.quantities() if isinstance(item, Parameters) else item
+                    key: item.quantities() if isinstance(item, Parameters) else _lists(item)
                     for key, item in value.items()
                 }
             elif isinstance(extra, dict) and extra.get("unit") and value is not None:
                 out[name] = f"{value!r} {extra['unit']}"
             elif isinstance(value, tuple):
-                out[name] = list(value)
+                out[name] = _lists(value)
             else:
                 out[name] = value
         return out
@@ -1353,14 +1358,19 @@ class Law(Parameters):
     def quantities(self) -> dict[str, Any]:
         """Return what the law says, as the configuration file would write it."""
         said = {name: value for name, value in super().quantities().items() if value is not None}
-        if self.quantiles is not None:
-            said["quantiles"] = [list(row) for row in self.quantiles]
         return said
 
 
 def _all_gains(variation: float = 0.10, among: tuple[Gain, ...] = GAIN_KEYS) -> dict[str, Law]:
     """Independent normal gains of one coefficient of variation."""
     return {f"gains.{gain}": Law(coefficient_of_variation=variation) for gain in among}
+
+
+WHY_NO_DESIGN = (
+    "a surrogate of the random quantities does not know the track of a passage, which decides more "
+    "of its extremes than they do; mcm counts over all tracks"
+)
+"""Reason why no method with a surrogate is carried out where tracks differ."""
 
 
 class Case(Parameters):
@@ -1406,9 +1416,14 @@ class Case(Parameters):
         return hash(repr(self))
 
     @property
-    def random_track(self) -> bool:
-        """Whether runs differ in their track."""
-        return self.track != "fixed"
+    def possible_methods(self) -> tuple[Method, ...]:
+        """Methods of the case that can be carried out.
+
+        A surrogate of the random quantities does not know the track of a passage: where tracks
+        differ, only the baseline is left (`WHY_NO_DESIGN`).
+        """
+        fixed = self.track == "fixed"
+        return tuple(name for name in self.methods if fixed or name == "mcm")
 
     @model_validator(mode="before")
     @classmethod
