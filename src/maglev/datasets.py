@@ -21,6 +21,7 @@ import xarray as xr
 from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.vocabulary import (
+    CAR_RESPONSES,
     DECISIONS,
     DENSITY_METHODS,
     GAIN_UNITS,
@@ -28,13 +29,17 @@ from maglev.vocabulary import (
     GROUPS,
     LIMIT_STATUS,
     METHODS,
+    PAPER_RESPONSES,
+    RESPONSE_TABLE,
     RESPONSE_UNITS,
-    RESPONSE_WORDS,
     RESPONSES,
+    SIGNED_RESPONSES,
     SOURCES,
     STATUS,
     SURROGATES,
+    TIMED_RESPONSES,
     TRAIN_PARTS,
+    ResponseEntry,
 )
 
 CONVENTIONS = "CF-1.11"
@@ -81,9 +86,9 @@ class Variable:
     def attributes(self) -> dict[str, Any]:
         """Attributes of the variable in a file."""
         if self.units in (OF_RESPONSE, PER_RESPONSE):
-            units = list(RESPONSE_UNITS.values())
+            units = [RESPONSE_UNITS[name] for name in PAPER_RESPONSES]
             if self.units == PER_RESPONSE:
-                units = [{"m": "m-1", "m s-2": "m-1 s2"}[unit] for unit in units]
+                units = [{"m": "m-1", "m s-2": "m-1 s2", "1": "1"}[unit] for unit in units]
             return {"long_name": self.long_name, "units_by_response": ", ".join(units)}
         if self.flags is None:
             return {"units": self.units, "long_name": self.long_name}
@@ -151,23 +156,8 @@ def _model_table() -> dict[str, Variable]:
     }
     for name, unit in GAIN_UNITS.items():
         table[name] = _number("sample", unit, f"{name.replace('_', ' ')} of the magnets")
-    for name, meaning in RESPONSE_WORDS.items():
-        unit = RESPONSE_UNITS[name]
-        table[name] = _number("sample", unit, f"largest absolute {meaning}")
-        table[f"{name}_t"] = _number("sample", "s", f"time of the largest absolute {meaning}")
-        of_car = name.startswith("car_body")
-        table[f"{name}_history"] = _number(
-            "sample car t" if of_car else "sample t",
-            unit,
-            meaning.replace(", largest over the cars", ""),
-            "float32",
-        )
-        if of_car:
-            table[f"{name}_per_car"] = _number(
-                "sample car",
-                unit,
-                f"largest absolute {meaning.replace(', largest over the cars', '')}",
-            )
+    for name, entry in RESPONSE_TABLE.items():
+        table |= _response_variables(name, entry)
     for kind in ("suspension", "guidance"):
         for end, word in (("min", "smallest"), ("max", "largest")):
             table[f"{kind}_gap_{end}"] = _number("sample", "m", f"{word} gap of any {kind} pole")
@@ -257,6 +247,26 @@ def _model_table() -> dict[str, Variable]:
     table["measured_deflection"] = _number(
         "measured_speed", "m", "largest vertical deflection at midspan measured on the line"
     )
+    return table
+
+
+def _response_variables(name: str, entry: ResponseEntry) -> dict[str, Variable]:
+    """Variables of a response: its value, and what is kept beside it."""
+    of_one = entry.words.replace(", largest over the cars", "")
+    motion = of_one.removeprefix("largest absolute ")
+    table = {name: _number("sample", entry.unit, entry.words)}
+    if entry.timed:
+        table[f"{name}_t"] = _number("sample", "s", f"time of the {entry.words}")
+    if entry.kind == "car":
+        table[f"{name}_per_car"] = _number("sample car", entry.unit, of_one)
+    if name in PAPER_RESPONSES:
+        dims = "sample car t" if entry.kind == "car" else "sample t"
+        table[f"{name}_history"] = _number(dims, entry.unit, motion, "float32")
+    if name in SIGNED_RESPONSES:
+        side = "downwards" if name.endswith("_z") else "to the right"
+        other = "upwards" if name.endswith("_z") else "to the left"
+        table[f"{name}_positive"] = _number("sample", entry.unit, f"largest {motion}, {side}")
+        table[f"{name}_negative"] = _number("sample", entry.unit, f"largest {motion}, {other}")
     return table
 
 
@@ -747,7 +757,7 @@ def _study_table() -> dict[str, Variable]:
         ),
         "check_case": _number("check", "1", "case that is checked, see flag_meanings", "int32"),
         "check_method": _code("check", "method that is checked", METHODS),
-        "check_response": _code("check", "response that is checked", (*RESPONSES, "none")),
+        "check_response": _code("check", "response that is checked", (*PAPER_RESPONSES, "none")),
         "check_failure_probability": _number(
             "check", "1", "failure probability of the limit, 0 where none is meant"
         ),
@@ -779,9 +789,9 @@ class Layout:
 _EXTREMES = (
     *GAINS,
     *RESPONSES,
-    *(f"{name}_t" for name in RESPONSES),
-    "car_body_acceleration_z_per_car",
-    "car_body_acceleration_y_per_car",
+    *(f"{name}_t" for name in TIMED_RESPONSES),
+    *(f"{name}_per_car" for name in CAR_RESPONSES),
+    *(f"{name}_{part}" for name in SIGNED_RESPONSES for part in ("positive", "negative")),
     "suspension_gap_min",
     "suspension_gap_max",
     "guidance_gap_min",
@@ -793,7 +803,7 @@ _EXTREMES = (
     "lost_magnet",
 )
 _HISTORIES = (
-    *(f"{name}_history" for name in RESPONSES),
+    *(f"{name}_history" for name in PAPER_RESPONSES),
     "gap_history",
     "current_history",
     "magnet_kind",

@@ -6,7 +6,7 @@ from scipy import stats
 
 from maglev import datasets
 from maglev.datasets import LAYOUTS, VARIABLES
-from maglev.vocabulary import GAINS, RESPONSES
+from maglev.vocabulary import GAINS, PAPER_RESPONSES
 
 LEVELS = (0.1, 0.01, 0.001)
 MEAN = np.array([3500.0, 17.5, 4500.0, 17.5])
@@ -49,7 +49,7 @@ def runs(n=400, *, variation=0.1, parameters=(0, 1, 2, 3), seed=1):
     away = gains[:, 0] < 2650.0
     values[away] = np.nan
     given = {name: ("sample", gains[:, k]) for k, name in enumerate(GAINS)}
-    given |= {name: ("sample", values[:, k]) for k, name in enumerate(RESPONSES)}
+    given |= {name: ("sample", values[:, k]) for k, name in enumerate(PAPER_RESPONSES)}
     given |= {
         "standard": (("sample", "parameter"), standard),
         "status": ("sample", np.where(away, 2, 0)),
@@ -151,7 +151,7 @@ def prediction(n=300, methods=(1, 2, 3)):
     """Predictions with an error of a tenth of a deviation."""
     rng = np.random.default_rng(3)
     made = runs(n)
-    computed = np.column_stack([made[name] for name in RESPONSES])
+    computed = np.column_stack([made[name] for name in PAPER_RESPONSES])
     error = 0.1 * WIDTH * rng.standard_normal((len(methods), n, 6))
     away = made["status"].to_numpy() != 0
     given = {

@@ -8,7 +8,7 @@ from maglev.datasets import LAYOUTS, VARIABLES, describe
 from maglev.parameters import Config
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import gf_points
-from maglev.vocabulary import DECISIONS, GAINS, RESPONSES
+from maglev.vocabulary import DECISIONS, GAINS, PAPER_RESPONSES
 
 BORDER = -1.8
 """Gains below it in the first standard coordinate lose levitation."""
@@ -52,7 +52,7 @@ def runs(standard, probability=None, *, loses=False, parameters=(0, 1, 2, 3), va
     for name in (*LAYOUTS["runs"].variables, "track_seed"):
         sizes = {"sample": n, "car": 1, "parameter": standard.shape[1]}
         filled[name] = (VARIABLES[name].dims, np.zeros([sizes[d] for d in VARIABLES[name].dims]))
-    filled |= {name: ("sample", y[:, k]) for k, name in enumerate(RESPONSES)}
+    filled |= {name: ("sample", y[:, k]) for k, name in enumerate(PAPER_RESPONSES)}
     filled["status"] = ("sample", np.where(away, 2, 0))
     filled["standard"] = (("sample", "parameter"), standard)
     filled["probability"] = ("sample", np.full(n, 1 / n) if probability is None else probability)

@@ -45,7 +45,7 @@ def many_lost(n, seed):
     standard = np.random.default_rng(seed).standard_normal((n, 4))
     made = synthetic.runs(standard, loses=True)
     away = is_lost(standard)
-    for name in synthetic.RESPONSES:
+    for name in synthetic.PAPER_RESPONSES:
         made[name] = made[name].where(~away)
     made["status"] = ("sample", np.where(away, 1, 0))
     return describe(made)
@@ -62,7 +62,7 @@ def test_designs_of_which_one_in_seven_is_lost_give_losses_and_limits():
     design = synthetic.design(104)
     away = is_lost(design["standard"].to_numpy())
     assert away.sum() > 8
-    for name in synthetic.RESPONSES:
+    for name in synthetic.PAPER_RESPONSES:
         design[name] = design[name].where(~away)
     design["status"] = ("sample", np.where(away, 1, 0))
     fitted = describe(surrogate.dataset(CONFIG, "asm", design))

@@ -20,7 +20,7 @@ from maglev.stages import (
     tables,
     track_split,
 )
-from maglev.vocabulary import DENSITY_METHODS, LIMIT_STATUS, METHODS, RESPONSES
+from maglev.vocabulary import DENSITY_METHODS, LIMIT_STATUS, METHODS, PAPER_RESPONSES
 
 LEVELS = np.array(CONFIG.study.failure_probability)
 
@@ -158,7 +158,7 @@ def test_a_baseline_has_counted_limits_and_no_gdee():
     check(describe(shown), "density")
     n_lost = int((runs["standard"][:, 0] < BORDER).sum())
     assert_allclose(found["lost_probability"], n_lost / 3000)
-    ranked = np.sort(np.where(runs["status"] == 0, runs[RESPONSES[0]], np.inf))
+    ranked = np.sort(np.where(runs["status"] == 0, runs[PAPER_RESPONSES[0]], np.inf))
     assert found["limit"][0, 1] == ranked[3000 - 300 - 1]
     assert np.isnan(shown["density"]).all() and np.isnan(shown["peak"]).all()
     assert (shown["density_method"] == DENSITY_METHODS.index("direct")).all()

@@ -13,7 +13,7 @@ from maglev.datasets import VARIABLES
 from maglev.errors import UserError
 from maglev.figures import labels
 from maglev.figures.style import Look
-from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
+from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, PAPER_RESPONSES
 
 _ENDS = ("", "_low", "_high")
 _INFINITE = LIMIT_STATUS.index(INFINITE)
@@ -90,7 +90,7 @@ def _gathered(
     for name, values in columns.items():
         stacked = np.stack(values).astype(VARIABLES[f"curve_{name}"].dtype)
         variables[f"curve_{name}"] = (dims[: stacked.ndim], stacked)
-    response = np.arange(len(RESPONSES), dtype=np.int8)
+    response = np.arange(len(PAPER_RESPONSES), dtype=np.int8)
     return xr.Dataset(variables, coords={"curve": named(data), "response": response})
 
 

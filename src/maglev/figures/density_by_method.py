@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from maglev.errors import UserError
 from maglev.figures import curves, labels, style
-from maglev.vocabulary import RESPONSES
+from maglev.vocabulary import PAPER_RESPONSES
 
-_RESPONSE = RESPONSES.index("girder_displacement_z")
+_RESPONSE = PAPER_RESPONSES.index("girder_displacement_z")
 
 
 def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:

@@ -14,7 +14,7 @@ from matplotlib.typing import LineStyleType
 
 from maglev.errors import UserError
 from maglev.figures import style
-from maglev.vocabulary import GAINS, METHODS, RESPONSES
+from maglev.vocabulary import GAINS, METHODS, PAPER_RESPONSES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,9 +61,9 @@ SHOWN = tuple(
         ("car-body acceleration, lat.", "acceleration", _ACCELERATION),
     )
 )
-"""How each response is shown, in the order of `maglev.vocabulary.RESPONSES`."""
+"""How each response is shown, in the order of `maglev.vocabulary.PAPER_RESPONSES`."""
 
-assert len(SHOWN) == len(RESPONSES)
+assert len(SHOWN) == len(PAPER_RESPONSES)
 
 GAIN = ("suspension $k_p$", "suspension $k_d$", "guidance $k_p$", "guidance $k_d$")
 """The gains in short, in the order of `maglev.vocabulary.GAINS`."""

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from maglev.figures import labels, style
-from maglev.vocabulary import RESPONSES
+from maglev.vocabulary import PAPER_RESPONSES
 
 _SHORT = (
     "midspan\ndispl. vert.",
@@ -36,7 +36,8 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     """
     held = data["status"].to_numpy() == 0
     values = [
-        labels.SHOWN[k].scale * data[name].to_numpy()[held] for k, name in enumerate(RESPONSES)
+        labels.SHOWN[k].scale * data[name].to_numpy()[held]
+        for k, name in enumerate(PAPER_RESPONSES)
     ]
     n, n_lost = held.size, int((~held).sum())
     spans = []
@@ -44,7 +45,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         low, high = one.min(), np.quantile(one, 0.998)
         margin = 0.06 * (high - low)
         spans.append((low - margin, high + margin))
-    size = len(RESPONSES)
+    size = len(PAPER_RESPONSES)
     layout = ConstrainedLayoutEngine(w_pad=0.02, h_pad=0.02, wspace=0.02, hspace=0.02)
     fig = Figure(figsize=(style.PAGE, 6.8), layout=layout)
     axes = fig.subplots(size, size, sharex="col")
@@ -96,4 +97,4 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         fontsize=8,
         va="center",
     )
-    return fig, data[[*RESPONSES, "status"]]
+    return fig, data[[*PAPER_RESPONSES, "status"]]

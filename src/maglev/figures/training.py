@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from maglev.figures import curves, labels, style
-from maglev.vocabulary import METHODS, RESPONSES
+from maglev.vocabulary import METHODS, PAPER_RESPONSES
 
 _SHOWN = ("girder_displacement_z", "girder_acceleration_z")
 
@@ -55,7 +55,7 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
     )
     fig, axes = style.panels(2, 2, style.PAGE, 4.6)
     for column, name in enumerate(_SHOWN):
-        response = RESPONSES.index(name)
+        response = PAPER_RESPONSES.index(name)
         shown = labels.SHOWN[response]
         upper, lower = axes[column], axes[2 + column]
         for (n_runs, rmse, error), design in zip(rows, designs, strict=True):

@@ -15,7 +15,7 @@ from maglev.stages.limits import baseline_limits
 from maglev.stages.reads import PREDICTING, SURROGATE_OF_METHODS
 from maglev.stages.surrogate import predictor
 from maglev.uncertainty.reliability import sample_limits
-from maglev.vocabulary import METHODS, RESPONSES
+from maglev.vocabulary import METHODS, PAPER_RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -101,7 +101,7 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
 
     sizes = steps(design)
     n_steps = max(len(one) for one in sizes.values())
-    shape = (len(design), n_steps, len(RESPONSES))
+    shape = (len(design), n_steps, len(PAPER_RESPONSES))
     n_runs = np.zeros(shape[:2], dtype=int)
     rmse, error = np.full(shape, np.nan), np.full(shape, np.nan)
     share = np.full(shape[:2], np.nan)
@@ -129,7 +129,7 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
             for of, without in ((limit, int(np.count_nonzero(~held))), (held_limit, 0)):
                 of[row, step] = [
                     sample_limits(predicted[held, response], levels, n_lost=without).limit
-                    for response in range(len(RESPONSES))
+                    for response in range(len(PAPER_RESPONSES))
                 ]
         _LOG.info("%s: judged at %s runs", name, ", ".join(map(str, sizes[name])))
     of_step = ("method", "step", "response")

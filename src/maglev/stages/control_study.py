@@ -13,7 +13,7 @@ from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, extremes, lost
 from maglev.stages.tables import markdown, number, of_track
 from maglev.uncertainty.samples import deviation_interval
-from maglev.vocabulary import BASELINE, GROUPS, RESPONSE_UNITS, RESPONSES
+from maglev.vocabulary import BASELINE, GROUPS, PAPER_RESPONSES, RESPONSE_UNITS
 
 KINDS = ("suspension", "guidance")
 _ENDS = ("", "_low", "_high")
@@ -95,9 +95,11 @@ def dataset(
 
 def _moments(runs: xr.Dataset | None, confidence: float) -> np.ndarray:
     """Mean, standard deviation and its interval (moment, response) of the held runs."""
-    values = extremes(runs)[~lost(runs)] if runs is not None else np.empty((0, len(RESPONSES)))
+    values = (
+        extremes(runs)[~lost(runs)] if runs is not None else np.empty((0, len(PAPER_RESPONSES)))
+    )
     if values.shape[0] < 8:
-        return np.full((4, len(RESPONSES)), np.nan)
+        return np.full((4, len(PAPER_RESPONSES)), np.nan)
     ends = [deviation_interval(column, confidence) for column in values.T]
     return np.vstack([values.mean(axis=0), np.array(ends).T])
 
@@ -126,7 +128,7 @@ def rows(found: xr.Dataset) -> list[dict[str, object]]:
             "n_runs": int(one["curve_n_runs"]),
             **{name: float(one[f"curve_{name}"]) for name in _LOST},
         }
-        for r, response in enumerate(RESPONSES):
+        for r, response in enumerate(PAPER_RESPONSES):
             at = one.isel(response=r)
             for p, level in enumerate(found["failure_probability"].to_numpy()):
                 made.append(
@@ -187,7 +189,7 @@ def text(found: xr.Dataset) -> str:
                 for k in counted
             ),
         ]
-        for r, response in enumerate(RESPONSES)
+        for r, response in enumerate(PAPER_RESPONSES)
     ]
     limits = [
         [
@@ -198,7 +200,7 @@ def text(found: xr.Dataset) -> str:
                 for one in curves
             ),
         ]
-        for r, response in enumerate(RESPONSES)
+        for r, response in enumerate(PAPER_RESPONSES)
         for p, level in enumerate(found["failure_probability"].to_numpy())
     ]
     heads = [f"{case}, {method}" for case, method in pairs]

@@ -22,7 +22,7 @@ from maglev.uncertainty.gdee import (
 )
 from maglev.uncertainty.reliability import binomial_interval, error_range_near, exceedance
 from maglev.uncertainty.samples import held_part
-from maglev.vocabulary import BASELINE, DENSITY_METHODS, DESIGNED, RESPONSES
+from maglev.vocabulary import BASELINE, DENSITY_METHODS, DESIGNED, PAPER_RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -87,7 +87,7 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
     values, away = extremes(runs), lost(runs)
     n = away.size
     columns = []
-    for response in range(len(RESPONSES)):
+    for response in range(len(PAPER_RESPONSES)):
         held = held_part(values[:, response], away)
         column = _column(held.values, held.probability, held.lost_probability)
         n_beyond = np.round(column["exceedance"] * n)
@@ -154,7 +154,7 @@ def of_surrogate(
     loss = found.loss
     least, most = (loss.lower, loss.upper) if loss.region is not None else (0.0, 0.0)
     columns = []
-    for response, name in enumerate(RESPONSES):
+    for response, name in enumerate(PAPER_RESPONSES):
         held = held_part(predicted[:, response], likely_lost, probability)
         sample = (held.values, held.probability)
         column = _column(*sample, loss.probability)

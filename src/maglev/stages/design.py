@@ -38,7 +38,7 @@ from maglev.uncertainty.learning import predicted_limits, tail_batch, taylor_bat
 from maglev.uncertainty.pointset import sobol_points
 from maglev.uncertainty.selection import fit_selected
 from maglev.uncertainty.surrogate import Fit, Surrogate
-from maglev.vocabulary import ADAPTIVE, DECISIONS, DESIGNED, RESPONSES
+from maglev.vocabulary import ADAPTIVE, DECISIONS, DESIGNED, PAPER_RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -165,7 +165,7 @@ class _Design:
 
     def finished(self) -> xr.Dataset:
         """All rounds, from the store or computed, until the stopping rule holds."""
-        state = AdaptiveState.empty(self.inputs.n, len(RESPONSES))
+        state = AdaptiveState.empty(self.inputs.n, len(PAPER_RESPONSES))
         surrogate: Surrogate | None = None
         rounds: list[xr.Dataset] = []
         changes: list[float] = []
@@ -231,7 +231,7 @@ class _Design:
             self.config, self.case, standard, probability, self.store, n_threads=self.n_threads
         )
         n, start = standard.shape[0], state.lost.size
-        unknown = np.full((n, len(RESPONSES)), np.nan)
+        unknown = np.full((n, len(PAPER_RESPONSES)), np.nan)
         result["predicted"] = (
             ("sample", "response"),
             unknown if predicted is None else predicted,
@@ -254,7 +254,7 @@ class _Design:
             decision=(("round",), [np.int8(self._decision(state, [*changes, change]))]),
         ).assign_coords(
             sample=np.arange(start, start + n),
-            response=np.arange(len(RESPONSES), dtype=np.int8),
+            response=np.arange(len(PAPER_RESPONSES), dtype=np.int8),
             failure_probability=np.array(self.levels),
             round=np.array([number], dtype=np.int32),
         )
@@ -304,7 +304,7 @@ class _Design:
     @property
     def _driving(self) -> int:
         """Number of the response that drives the published method."""
-        return RESPONSES.index(self.settings.response)
+        return PAPER_RESPONSES.index(self.settings.response)
 
     def _limits(self, number: int, state: AdaptiveState, surrogate: Surrogate) -> FloatArray:
         """Limits (response, level) by a surrogate, on the same points in all rounds."""
@@ -318,7 +318,7 @@ class _Design:
     def _rmse(self, surrogate: Surrogate) -> FloatArray:
         """Root mean square error (1, response) against the baseline; NaN without one."""
         if self.truth is None:
-            return np.full((1, len(RESPONSES)), np.nan)
+            return np.full((1, len(PAPER_RESPONSES)), np.nan)
         standard, values = self.truth
         return np.sqrt(np.mean((surrogate.predict(standard) - values) ** 2, axis=0))[None]
 

@@ -11,7 +11,7 @@ from maglev.arrays import BoolArray, FloatArray
 from maglev.stages.randomness import generator_of_statistics
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import sobol_points
-from maglev.vocabulary import METHODS, RESPONSES
+from maglev.vocabulary import METHODS, PAPER_RESPONSES
 
 
 def lost(runs: xr.Dataset) -> BoolArray:
@@ -21,7 +21,7 @@ def lost(runs: xr.Dataset) -> BoolArray:
 
 def extremes(runs: xr.Dataset) -> FloatArray:
     """Extremes (sample, response) of a set of runs [m, m s-2], NaN where levitation was lost."""
-    return np.column_stack([runs[name].to_numpy() for name in RESPONSES])
+    return np.column_stack([runs[name].to_numpy() for name in PAPER_RESPONSES])
 
 
 def population(seed: int, n: int, n_parameters: int) -> FloatArray:
@@ -44,7 +44,7 @@ def population(seed: int, n: int, n_parameters: int) -> FloatArray:
 
 def coordinates(**along: npt.ArrayLike) -> dict[str, npt.ArrayLike]:
     """Coordinates of a file: the six responses, and others by name."""
-    return {"response": np.arange(len(RESPONSES), dtype=np.int8), **along}
+    return {"response": np.arange(len(PAPER_RESPONSES), dtype=np.int8), **along}
 
 
 def method_number(name: str) -> np.int8:

@@ -23,7 +23,7 @@ from maglev.uncertainty.reliability import (
     sample_limits,
     surrogate_limits,
 )
-from maglev.vocabulary import BASELINE, DESIGNED, GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
+from maglev.vocabulary import BASELINE, DESIGNED, GIVEN, INFINITE, LIMIT_STATUS, PAPER_RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -160,7 +160,7 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
             limits_off(
                 config, predictions[:, response], training[:, response], residuals[:, response], of
             )
-            for response in range(len(RESPONSES))
+            for response in range(len(PAPER_RESPONSES))
         ]
         for of in (losing, {})
     )
@@ -243,7 +243,7 @@ def _put_together(
                 values = np.where(infinite, np.inf, values)
             columns[f"{name}{suffix}"] = (level, values)
         columns[f"{name}_status"] = (level, status)
-    for response, name in enumerate(RESPONSES):
+    for response, name in enumerate(PAPER_RESPONSES):
         said = [
             f"{p:g}: {value:.4g}" if LIMIT_STATUS[code] == GIVEN else f"{p:g}: {LIMIT_STATUS[code]}"
             for p, value, code in zip(

@@ -19,7 +19,7 @@ from maglev.stages.tables import markdown, number
 from maglev.uncertainty.gdee import direct_density, silverman_bandwidth
 from maglev.uncertainty.reliability import Limits, clustered_limits
 from maglev.uncertainty.shares import crossed_shares, first_order
-from maglev.vocabulary import GAIN_KEYS, GIVEN, LIMIT_STATUS, RESPONSE_UNITS, RESPONSES
+from maglev.vocabulary import GAIN_KEYS, GIVEN, LIMIT_STATUS, PAPER_RESPONSES, RESPONSE_UNITS
 
 _LOG = logging.getLogger(__name__)
 
@@ -71,7 +71,7 @@ def dataset(config: Config, tracks: xr.Dataset) -> xr.Dataset:
     values = tracks["extreme"].to_numpy()[:, kept]
     n_tracks = values.shape[0]
     columns: dict[str, list[FloatArray]] = {}
-    for response, name in enumerate(RESPONSES):
+    for response, name in enumerate(PAPER_RESPONSES):
         at, of_track = _densities(values[:, :, response])
         share = crossed_shares(values[:, :, response], config.study.confidence)
         for key, one in (
@@ -151,7 +151,7 @@ def _densities(values: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _by_track(config: Config, tracks: xr.Dataset) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
     """Limits and first-order indices of each track by its surrogate, and limits of the line."""
     points = population(config.seed, N_POINTS, tracks.sizes["parameter"])
-    n_tracks, n_responses = tracks.sizes["track"], len(RESPONSES)
+    n_tracks, n_responses = tracks.sizes["track"], len(PAPER_RESPONSES)
     predictions = np.empty((n_tracks, N_POINTS, n_responses))
     held = np.ones(N_POINTS, dtype=bool)
     limits: list[list[Limits]] = []
@@ -213,7 +213,7 @@ def _of_track(tracks: xr.Dataset, number: int) -> xr.Dataset:
             "status": ("sample", one["status_on_track"].to_numpy()),
             **{
                 name: ("sample", one["extreme"].isel(response=r).to_numpy())
-                for r, name in enumerate(RESPONSES)
+                for r, name in enumerate(PAPER_RESPONSES)
             },
         }
     )
@@ -223,7 +223,7 @@ def rows(found: xr.Dataset) -> list[dict[str, object]]:
     """The table as rows of a CSV file: one per response and failure probability."""
     gains = [GAIN_KEYS[k] for k in found["parameter"].to_numpy()]
     made: list[dict[str, object]] = []
-    for r, response in enumerate(RESPONSES):
+    for r, response in enumerate(PAPER_RESPONSES):
         at = found.isel(response=r)
         leading = at["first_order_on_track"].to_numpy().argmax(axis=1)
         most = int(np.bincount(leading, minlength=len(gains)).argmax())

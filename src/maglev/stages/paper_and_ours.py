@@ -12,7 +12,7 @@ from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import lost
 from maglev.stages.tables import markdown, number, of_track
-from maglev.vocabulary import DECISIONS, METHODS, RESPONSES, SOURCES
+from maglev.vocabulary import DECISIONS, METHODS, PAPER_RESPONSES, SOURCES
 
 RESPONSE = "girder_displacement_z"
 """The response that the paper's surviving numbers speak of."""
@@ -71,7 +71,7 @@ def dataset(
     if "mcm" not in density:
         raise UserError("the paper's numbers are compared with a baseline, got no 'mcm' density")
     names = list(METHODS)
-    at = RESPONSES.index(RESPONSE)
+    at = PAPER_RESPONSES.index(RESPONSE)
     own = {name: one.isel(response=at) for name, one in density.items()}
     peaks = {name: _peak(one) for name, one in own.items()}
     errors = {name: peak / peaks["mcm"] - 1.0 for name, peak in peaks.items() if name != "mcm"}

@@ -16,7 +16,7 @@ from maglev.stage import Input, Stage
 from maglev.stages.extremes import extremes, lost
 from maglev.stages.limits import baseline_limits, status_numbers
 from maglev.uncertainty.reliability import binomial_interval
-from maglev.vocabulary import LIMIT_STATUS, METHODS, RESPONSES
+from maglev.vocabulary import LIMIT_STATUS, METHODS, PAPER_RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -168,7 +168,7 @@ def _against(
     value = float(found["lost_probability"])
     none = (_GIVEN, _GIVEN)
     checks.append(
-        _judged(LOSS, case, method, len(RESPONSES), 0.0, value, float(low), float(high), none)
+        _judged(LOSS, case, method, len(PAPER_RESPONSES), 0.0, value, float(low), float(high), none)
     )
     return checks
 

@@ -13,7 +13,14 @@ from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import coordinates, method_number
 from maglev.stages.tables import markdown, number, of_track
-from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, METHODS, RESPONSE_UNITS, RESPONSES
+from maglev.vocabulary import (
+    GIVEN,
+    INFINITE,
+    LIMIT_STATUS,
+    METHODS,
+    PAPER_RESPONSES,
+    RESPONSE_UNITS,
+)
 
 _OF_METHOD = tuple(
     f"{name}{end}" for name in ("limit", "held_limit") for end in ("", "_low", "_high", "_status")
@@ -79,7 +86,7 @@ def dataset(config: Config, limits: Mapping[str, xr.Dataset]) -> xr.Dataset:
 def rows(table: xr.Dataset) -> list[dict[str, object]]:
     """The table as rows of a CSV file: one per response, failure probability and method."""
     found: list[dict[str, object]] = []
-    for r, response in enumerate(RESPONSES):
+    for r, response in enumerate(PAPER_RESPONSES):
         for p, level in enumerate(table["failure_probability"].to_numpy()):
             for m, code in enumerate(table["method"].to_numpy()):
                 at = {"response": r, "failure_probability": p, "method": m}
@@ -127,7 +134,7 @@ def text(table: xr.Dataset, heading: str) -> str:
                 f"{level:g}",
                 *(_cell(by_place[response, float(level), METHODS[code]], prefix) for code in codes),
             ]
-            for response in RESPONSES
+            for response in PAPER_RESPONSES
             for level in table["failure_probability"].to_numpy()
         ]
 

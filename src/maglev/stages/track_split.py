@@ -18,7 +18,7 @@ from maglev.stages.randomness import generator_of_statistics
 from maglev.uncertainty.gdee import direct_density, silverman_bandwidth
 from maglev.uncertainty.samples import held_part
 from maglev.uncertainty.shares import pick_freeze_shares
-from maglev.vocabulary import RESPONSES
+from maglev.vocabulary import PAPER_RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -67,7 +67,7 @@ def dataset(
     )
     rng = generator_of_statistics(config.seed, "bootstrap of the shares")
     rows, shares = [], []
-    for response, name in enumerate(RESPONSES):
+    for response, name in enumerate(PAPER_RESPONSES):
         held = {key: held_part(values[key][:, response], lost(part)) for key, part in sets.items()}
         together = np.concatenate([one.values for one in held.values()])
         widest = max(silverman_bandwidth(one.values) for one in held.values())
