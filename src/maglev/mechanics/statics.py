@@ -53,7 +53,7 @@ def deflection(guideway: GuidewayModel, train: TrainModel, nose: npt.ArrayLike) 
 
 
 def largest_deflection(guideway: GuidewayModel, train: TrainModel, step: float = 0.5) -> float:
-    """Largest `deflection` [m] over all places of the train.
+    """Largest `deflection` [m] over all places of the train on the middle span.
 
     Parameters
     ----------
@@ -63,5 +63,8 @@ def largest_deflection(guideway: GuidewayModel, train: TrainModel, step: float =
         Distance of neighbouring places of the nose [m]; at 0.5 m a parabola over one span of
         25 m misses its top by less than 2e-4 of it.
     """
+    span, middle = guideway.parameters.span_length, midspan_of_middle_span(guideway)
     length = guideway.parameters.length + train.parameters.length
-    return float(deflection(guideway, train, np.arange(0.0, length + step, step)).max())
+    nose = np.arange(0.0, length + step, step)
+    on = (nose > middle - span / 2) & (nose < middle + span / 2 + train.parameters.length)
+    return float(deflection(guideway, train, nose[on]).max())
