@@ -69,9 +69,10 @@ def simulate(
         `maglev.vocabulary.RESPONSE_TABLE` and the times of those that have one [s], gaps [m],
         currents [A], ``status`` and where and when levitation was lost; with ``histories`` also the
         time series on ``t``.  The responses of a lost sample are NaN, as are those of a sample
-        whose gains ask for a smaller step, which is not judged (status ``step_too_large``).  Attributes ``time_step`` [s], ``n_steps`` and
-        ``track``, the words for the track that the numbers are of; of the reference solver also
-        ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
+        whose gains ask for a smaller step, which is not judged (status ``step_too_large``).
+        Attributes ``time_step`` [s], ``n_steps`` and ``track``, the words for the track that the
+        numbers are of; of the reference solver also ``estimated_error``, the largest of the six
+        responses of the paper as a share of it, and ``seconds``.
 
     Raises
     ------

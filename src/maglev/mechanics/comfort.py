@@ -87,7 +87,7 @@ SPERLING_VERTICAL = Weighting(
     poles=((4.9059, 0.5496), (22.4751, 0.9838), (5.9217, 2.4388), (0.3939, 0.0)),
     highpass=(0.3939,),
 )
-"""Fitted to `sperling_weight` from 0.5 to 40 Hz, at most 1.5 % off: 0.5 % of the index."""
+"""Fitted to `sperling_weight` from 0.5 to 40 Hz, at most 1.6 % off: 0.5 % of the index."""
 
 SPERLING_LATERAL = Weighting(
     gain=0.9228,

@@ -599,12 +599,9 @@ def passages_of(record: Record, config: Config, every: int) -> Passages:
         _largest(*extremes(history, record.time, status), axis=2) for history in ends
     )
     one_way, other_way = (
-        extremes(np.maximum(sign * record.girder, 0.0), record.time, status)[0]
-        for sign in (1.0, -1.0)
+        _one_sided(sign * record.girder, record.time, status)[0] for sign in (1.0, -1.0)
     )
-    lift, lift_time = _largest(
-        *extremes(np.maximum(record.opening, 0.0), record.time, status), axis=1
-    )
+    lift, lift_time = _largest(*_one_sided(record.opening, record.time, status), axis=1)
     weighted = weighted_rms(config, record.time, ends)
     weighted[status != 0] = np.nan
     models = guideway_model.build(config.guideway), train_model.build(config.train)
@@ -646,6 +643,17 @@ def passages_of(record: Record, config: Config, every: int) -> Passages:
         gap_history=samples_first(record.gap),
         current_history=samples_first(record.current),
     )
+
+
+def _one_sided(
+    history: FloatArray, time: FloatArray, status: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """As `extremes`, of values above zero alone; the last value may be the largest."""
+    above = np.maximum(history, 0.0)
+    value, when = extremes(above, time, status)
+    last = above[-1].T >= above.max(axis=0).T
+    ends = last & (status == 0).reshape(-1, *[1] * (value.ndim - 1)) & (above[-1].T > 0)
+    return np.where(ends, above[-1].T, value), np.where(ends, time[-1], when)
 
 
 def _largest(value: FloatArray, when: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
