@@ -26,7 +26,7 @@ from pydantic import (
 )
 
 from maglev.errors import UserError
-from maglev.vocabulary import GAIN_KEYS, GROUPS, Gain, Group, Method, Response, Surrogate
+from maglev.vocabulary import GAIN_KEYS, GROUPS, Gain, Group, Method, PaperResponse, Surrogate
 
 if TYPE_CHECKING:
     import pint
@@ -1033,7 +1033,7 @@ class PaperDesign(Parameters):
         1000, "GF points that rounds choose from", minimum=8, maximum=_COUNTED
     )
     batch_size: int = _count(4, "runs of one round")
-    response: Response = Field("girder_displacement_z", description="response that drives")
+    response: PaperResponse = Field("girder_displacement_z", description="response that drives")
     threshold: float = Field(
         0.02,
         description="error of a round that counts as small, in standard deviations of the response",

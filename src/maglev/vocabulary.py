@@ -100,17 +100,18 @@ RESPONSE_TABLE: Mapping[str, ResponseEntry] = {
 }
 """Every response that a passage is judged by: its unit and its meaning, in the order of files."""
 
-if TYPE_CHECKING:
-    Response: TypeAlias = str
-else:
-    Response = Literal[tuple(RESPONSE_TABLE)]
-"""A response whose extreme a passage is judged by: a name in `RESPONSE_TABLE`."""
-
-RESPONSES: tuple[Response, ...] = tuple(RESPONSE_TABLE)
+RESPONSES: tuple[str, ...] = tuple(RESPONSE_TABLE)
 """All responses in the order of ``response`` in files and arrays."""
 
-PAPER_RESPONSES: tuple[Response, ...] = RESPONSES[:6]
+PAPER_RESPONSES: tuple[str, ...] = RESPONSES[:6]
 """The responses of the paper: midspan and car bodies."""
+
+if TYPE_CHECKING:
+    Response: TypeAlias = str
+    PaperResponse: TypeAlias = str
+else:
+    Response = Literal[RESPONSES]
+    PaperResponse = Literal[PAPER_RESPONSES]
 
 TIMED_RESPONSES: tuple[Response, ...] = tuple(
     name for name, entry in RESPONSE_TABLE.items() if entry.timed
