@@ -190,7 +190,7 @@ def _run(stage: Stage) -> Callable[..., None]:
 
 
 def _of_track(files: dict[str, Any]) -> dict[str, str]:
-    """Of which track a file is that is made of others, where they say it."""
+    """Attributes on the track of a file that is made of others, where they have them."""
     every = [
         one
         for found in files.values()
@@ -206,7 +206,7 @@ def _files(stage: Stage, given: dict[str, Any]) -> dict[str, Any]:
     Raises
     ------
     click.UsageError
-        If a file is missing, or one is given that the method has no use for.
+        If a file is missing, or the method does not use one that is given.
     """
     from maglev.stage import flag
 

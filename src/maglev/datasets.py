@@ -51,7 +51,7 @@ REFERENCES = (
 AXES = "x along travel from the first pier, y to the right, z down; SI units"
 
 OF_RESPONSE = "of the response"
-"""In place of a unit: that of the response along ``response``, see `RESPONSE_UNITS`."""
+"""Stands for the unit of each response along ``response``, see `RESPONSE_UNITS`."""
 
 PER_RESPONSE = "one over that of the response"
 """As `OF_RESPONSE`, for a density."""
@@ -69,7 +69,7 @@ class Variable:
         Unit in the notation of UDUNITS; ``"1"`` for a pure number; `OF_RESPONSE` or
         `PER_RESPONSE` for a variable along ``response``, whose rows have each their own unit.
     long_name
-        What it is, as an axis label would say it.
+        Meaning, in the words of an axis label.
     dtype
         Type in the file.
     flags
@@ -148,7 +148,7 @@ def _model_table() -> dict[str, Variable]:
         "mode": _number("mode", "1", "number of the mode from the lowest", "int32"),
         "speed": _number("speed", "m s-1", "speed of the train"),
         "measured_speed": _number("measured_speed", "m s-1", "speed of the measured passage"),
-        "status": _code("sample", "how the passage ended", STATUS),
+        "status": _code("sample", "end of the passage", STATUS),
         "lost_t": _number("sample", "s", "time at which levitation was lost"),
         "lost_magnet": _number(
             "sample", "1", "number of the magnet that lost levitation, -1 for none", "int32"
@@ -182,7 +182,7 @@ def _model_table() -> dict[str, Variable]:
         table[f"target_{direction}"] = _number(
             "wavenumber",
             "m3",
-            f"one-sided spectrum that the {direction} irregularity is drawn from",
+            f"one-sided target spectrum of the {direction} irregularity",
         )
         table[f"deviation_{direction}"] = _number(
             "", "m", f"standard deviation of the {direction} irregularity"
@@ -190,7 +190,7 @@ def _model_table() -> dict[str, Variable]:
     table["frequency"] = _number("mode", "Hz", "natural frequency of the guideway")
     table["direction"] = _code(
         "mode",
-        "motion that holds most of the mode's kinetic energy",
+        "motion with most of the mode's kinetic energy",
         {0: "longitudinal", 1: "lateral", 2: "vertical", 3: "torsion"},
     )
     for part, where in (("girder", "the girder axis"), ("rail", "the right rail")):
@@ -224,25 +224,27 @@ def _model_table() -> dict[str, Variable]:
     table["dynamic_factor_moving_load"] = _number(
         "speed", "1", "dynamic coefficient of a simply supported beam under a moving uniform load"
     )
-    table["passage_status"] = _code("speed", "how the passage ended", STATUS)
+    table["passage_status"] = _code("speed", "end of the passage", STATUS)
     table["beam_frequency"] = _number(
         "beam_frequency", "Hz", "first vertical frequency of a simply supported beam"
     )
     table["beam_deflection"] = _number(
-        "beam_frequency", "m", "its static deflection with the mass and the load of the model"
+        "beam_frequency",
+        "m",
+        "static deflection of this beam with the mass and the load of the model",
     )
     table["model_frequency"] = _number("", "Hz", "first vertical frequency of the model")
-    table["car_load"] = _number("", "kg", "mass of a car that makes the load of the model")
+    table["car_load"] = _number("", "kg", "mass of a car, by which the train loads the model")
     table["mass_per_length"] = _number("", "kg m-1", "mass of the bridge per length, with rails")
     table["bending_stiffness"] = _number("", "N m2", "vertical bending stiffness of the girder")
     table["measured_static_deflection"] = _number(
         "", "m", "measured deflection over the dynamic coefficient of a moving uniform load"
     )
     table["needed_car_load"] = _number(
-        "", "kg", "mass of a car with which the measured pair would be that of a beam"
+        "", "kg", "mass of a car for which a beam would have the measured pair"
     )
     table["needed_mass_per_length"] = _number(
-        "", "kg m-1", "mass of the bridge with which the measured pair would be that of a beam"
+        "", "kg m-1", "mass of the bridge per length for which a beam would have the measured pair"
     )
     table["measured_deflection"] = _number(
         "measured_speed", "m", "largest vertical deflection at midspan measured on the line"
@@ -276,33 +278,29 @@ def _study_table() -> dict[str, Variable]:
     step_level = "method step response failure_probability"
     return {
         # coordinates
-        "response": _code("response", "response whose extreme is meant", RESPONSES),
+        "response": _code("response", "response", RESPONSES),
         "parameter": _code("parameter", "random gain", GAINS),
-        "method": _code("method", "method by which the runs were chosen", METHODS),
+        "method": _code("method", "method of choosing the runs", METHODS),
         "failure_probability": _number(
             "failure_probability", "1", "probability that the limit is exceeded"
         ),
         "round": _number("round", "1", "number of the round, 0 is the first design", "int32"),
         "step": _number("step", "1", "number of the step towards more runs", "int32"),
-        "cell": _number("cell", "1", "number of the place along the value", "int32"),
+        "cell": _number("cell", "1", "number of the value", "int32"),
         "check": _number("check", "1", "number of the check", "int32"),
         # points and runs
         "standard": _number(
             "sample parameter", "1", "gain less its mean, over its standard deviation"
         ),
-        "probability": _number("sample", "1", "probability that the sample stands for"),
+        "probability": _number("sample", "1", "probability that the sample represents"),
         "discrepancy": _number("", "1", "GF-discrepancy of the points"),
         "counting_error": _number(
             "", "1", "largest standard error of the probabilities by counting"
         ),
-        "track_seed": _number(
-            "sample", "1", "seed of the irregularity that the sample meets", "int64"
-        ),
+        "track_seed": _number("sample", "1", "seed of the irregularity of the sample", "int64"),
         # designs
         "round_index": _number("sample", "1", "round that added the sample", "int32"),
-        "predicted": _number(
-            "sample response", OF_RESPONSE, "extreme as predicted before it was run"
-        ),
+        "predicted": _number("sample response", OF_RESPONSE, "extreme as predicted before the run"),
         "score": _number("sample", "1", "score by which the sample was chosen"),
         "round_n_runs": _number("round", "1", "number of runs after the round", "int32"),
         "error": _number(
@@ -326,7 +324,7 @@ def _study_table() -> dict[str, Variable]:
             OF_RESPONSE,
             "limit by the surrogate after the round",
         ),
-        "decision": _code("round", "what was decided after the round", DECISIONS),
+        "decision": _code("round", "decision after the round", DECISIONS),
         # surrogates
         "kind": _code("response", "kind of the surrogate", SURROGATES),
         "leave_one_out_error": _number(
@@ -374,7 +372,7 @@ def _study_table() -> dict[str, Variable]:
         ),
         "bandwidth": _number("response", OF_RESPONSE, "bandwidth of the direct density"),
         "mesh_size": _number("response", OF_RESPONSE, "mesh size of the GDEE"),
-        "density_method": _code("response", "how the density was found", DENSITY_METHODS),
+        "density_method": _code("response", "method of the density", DENSITY_METHODS),
         "peak": _number(
             "response", PER_RESPONSE, "largest value of the density by the GDEE on its own mesh"
         ),
@@ -384,13 +382,13 @@ def _study_table() -> dict[str, Variable]:
             "response", OF_RESPONSE, "standard deviation of the extreme of held samples"
         ),
         "skewness": _number("response", "1", "skewness of the extreme of held samples"),
-        "n_runs": _number("", "1", "number of runs of the model behind the file", "int32"),
+        "n_runs": _number("", "1", "number of runs of the model", "int32"),
         # limits
         **_with_ends(
             "limit",
             _number(level, OF_RESPONSE, "limit that is exceeded with the failure probability"),
         ),
-        "limit_status": _code(level, "what can be said of the limit", LIMIT_STATUS),
+        "limit_status": _code(level, "status of the limit", LIMIT_STATUS),
         **_with_ends(
             "held_limit",
             _number(
@@ -400,14 +398,14 @@ def _study_table() -> dict[str, Variable]:
             ),
         ),
         "held_limit_status": _code(
-            level, "what can be said of the limit given that levitation holds", LIMIT_STATUS
+            level, "status of the limit given that levitation holds", LIMIT_STATUS
         ),
-        "sigma": _number("response", OF_RESPONSE, "standard deviation that errors are divided by"),
+        "sigma": _number("response", OF_RESPONSE, "standard deviation by which errors are divided"),
         # accuracy
         "step_n_runs": _number(
             "method step", "1", "number of runs, 0 where there is none", "int32"
         ),
-        "step_limit": _number(step_level, OF_RESPONSE, "limit from so many runs"),
+        "step_limit": _number(step_level, OF_RESPONSE, "limit from this number of runs"),
         "step_limit_error": _number(
             step_level, "1", "limit less that of the baseline, over the standard deviation"
         ),
@@ -423,14 +421,13 @@ def _study_table() -> dict[str, Variable]:
         "step_rmse": _number(
             "method step response",
             OF_RESPONSE,
-            "root mean square error of the surrogate of so many runs against the baseline",
+            "root mean square error of the surrogate of this number of runs against the baseline",
         ),
         "step_error": _number(
             "method step response",
             "1",
-            "largest absolute error of the surrogate of so many runs at the runs of the design "
-            "that come next, as many as one round of the method asm has, over the standard "
-            "deviation",
+            "largest absolute error of the surrogate of this number of runs at the next runs of "
+            "the design, as many as a round of the method asm has, over the standard deviation",
         ),
         "reference_limit": _number(level, OF_RESPONSE, "limit from the baseline"),
         "reference_half_width": _number(
@@ -480,8 +477,8 @@ def _study_table() -> dict[str, Variable]:
             f"{gain}_border_{side}": _number(
                 "",
                 units,
-                f"{word} at which the car ceases to be stable {where} the mean gains, the other "
-                f"gains at their means; NaN if it does not {how}",
+                f"{word} at the border of stability {where} the mean, the other gains at "
+                f"their means; NaN if there is none {how}",
             )
             for gain, units, word in (
                 ("proportional", "A m-1", "suspension proportional gain"),
@@ -496,30 +493,32 @@ def _study_table() -> dict[str, Variable]:
         "proportional_border": _number(
             "current_lag grid_derivative",
             "A m-1",
-            "suspension proportional gain below which the car is not stable at each derivative "
-            "gain; NaN if there is none in the map, or the mean is not stable",
+            "suspension proportional gain at the lower border of stability for each derivative "
+            "gain; NaN if there is none in the map, or the mean is unstable",
         ),
         "derivative_border": _number(
             "current_lag grid_proportional",
             "A s m-1",
-            "suspension derivative gain below which the car is not stable at each proportional "
-            "gain; NaN if there is none, or the mean is not stable",
+            "suspension derivative gain at the lower border of stability for each proportional "
+            "gain; NaN if there is none, or the mean is unstable",
         ),
         "static_limit": _number(
-            "", "A m-1", "suspension proportional gain below which a magnet cannot hold: i0/delta0"
+            "", "A m-1", "least suspension proportional gain at which a magnet can hold: i0/delta0"
         ),
         "mean_proportional": _number("", "A m-1", "mean suspension proportional gain"),
         "mean_derivative": _number("", "A s m-1", "mean suspension derivative gain"),
         # modes of the train
-        "train_part": _code("train_part", "what moves", TRAIN_PARTS),
+        "train_part": _code("train_part", "moving part of the train", TRAIN_PARTS),
         "train_frequency": _number(
-            "mode", "Hz", "natural frequency of the levitated car: size of the root over 2 pi"
+            "mode",
+            "Hz",
+            "natural frequency of the levitated car, the modulus of the root over 2 pi",
         ),
         "damping_ratio": _number("mode", "1", "damping over critical damping"),
         "kinetic_share": _number(
-            "mode train_part", "1", "share of the mode's kinetic energy in what moves"
+            "mode train_part", "1", "share of the mode's kinetic energy in the moving part"
         ),
-        "moves": _code("mode", "what holds most of the mode's kinetic energy", TRAIN_PARTS),
+        "moves": _code("mode", "part with most of the mode's kinetic energy", TRAIN_PARTS),
         # random track
         "density_both": _number(
             "response cell",
@@ -538,19 +537,21 @@ def _study_table() -> dict[str, Variable]:
         ),
         **_with_ends(
             "gains_share",
-            _number("response", "1", "share of the variance that the gains alone contribute"),
+            _number("response", "1", "share of the variance due to the gains alone"),
         ),
         **_with_ends(
             "track_share",
-            _number("response", "1", "share of the variance that the track alone contributes"),
+            _number("response", "1", "share of the variance due to the track alone"),
         ),
         **_with_ends(
             "interaction_share",
-            _number("response", "1", "share of the variance that gains and track have together"),
+            _number(
+                "response", "1", "share of the variance due to the interaction of gains and track"
+            ),
         ),
         # who shares a circuit
         **{
-            f"{kind}_group": _code("curve", f"who shares a circuit of the {kind}", GROUPS)
+            f"{kind}_group": _code("curve", f"sharing of the circuits of the {kind}", GROUPS)
             for kind in ("suspension", "guidance")
         },
         **{
@@ -573,7 +574,7 @@ def _study_table() -> dict[str, Variable]:
         "track": _number("track", "1", "number of the track", "int32"),
         "seed_of_track": _number("track", "1", "seed of the irregularity of the track", "int64"),
         "extreme": _number("track sample response", OF_RESPONSE, "largest absolute response"),
-        "status_on_track": _code("track sample", "how the passage ended", STATUS),
+        "status_on_track": _code("track sample", "end of the passage", STATUS),
         "density_of_track": _number(
             "track response cell",
             PER_RESPONSE,
@@ -609,7 +610,7 @@ def _study_table() -> dict[str, Variable]:
             ),
         ),
         "held_limit_on_track_status": _code(
-            "track response failure_probability", "what can be said of the limit", LIMIT_STATUS
+            "track response failure_probability", "status of the limit", LIMIT_STATUS
         ),
         "narrow_limit_on_track": _number(
             "track response failure_probability",
@@ -626,15 +627,13 @@ def _study_table() -> dict[str, Variable]:
             ),
         ),
         "held_limit_of_line_status": _code(
-            "response failure_probability", "what can be said of the limit", LIMIT_STATUS
+            "response failure_probability", "status of the limit", LIMIT_STATUS
         ),
         "lost_share_on_track": _number(
             "track", "1", "share of the points of the gains at which levitation is lost"
         ),
         # what figures show of several files
-        "curve": _number(
-            "curve", "1", "file that is shown by case and method, see flag_meanings", "int32"
-        ),
+        "curve": _number("curve", "1", "case and method of the curve, see flag_meanings", "int32"),
         "curve_value": _number("curve response cell", OF_RESPONSE, "extreme"),
         **_with_ends(
             "curve_density",
@@ -682,7 +681,7 @@ def _study_table() -> dict[str, Variable]:
             _number("curve", "1", "probability that levitation is lost"),
         ),
         "curve_n_runs": _number("curve", "1", "number of runs of the model", "int32"),
-        "curve_n_lost": _number("curve", "1", "number of them that lost levitation", "int32"),
+        "curve_n_lost": _number("curve", "1", "number of runs that lost levitation", "int32"),
         "curve_variation": _number("curve", "1", "coefficient of variation of the gains"),
         "curve_round_n_runs": _number(
             "curve round", "1", "number of runs after the round, 0 where there is none", "int32"
@@ -707,7 +706,7 @@ def _study_table() -> dict[str, Variable]:
             ),
         ),
         "table_limit_status": _code(
-            "method response failure_probability", "what can be said of the limit", LIMIT_STATUS
+            "method response failure_probability", "status of the limit", LIMIT_STATUS
         ),
         **_with_ends(
             "table_held_limit",
@@ -719,7 +718,7 @@ def _study_table() -> dict[str, Variable]:
         ),
         "table_held_limit_status": _code(
             "method response failure_probability",
-            "what can be said of the limit given that levitation holds",
+            "status of the limit given that levitation holds",
             LIMIT_STATUS,
         ),
         **_with_ends(
@@ -727,7 +726,7 @@ def _study_table() -> dict[str, Variable]:
             _number("method", "1", "probability that levitation is lost"),
         ),
         "table_n_runs": _number("method", "1", "number of runs of the model", "int32"),
-        "source": _code("source", "whose number stands there", SOURCES),
+        "source": _code("source", "source of the number", SOURCES),
         "paper_peak": _number(
             "source method", "m-1", "largest density of the girder's vertical displacement"
         ),
@@ -739,14 +738,16 @@ def _study_table() -> dict[str, Variable]:
             "m",
             "root mean square error of the girder's vertical displacement against the baseline",
         ),
-        "paper_rmse_n_runs": _number("source method", "1", "number of runs behind it", "int32"),
+        "paper_rmse_n_runs": _number(
+            "source method", "1", "number of runs of the root mean square error", "int32"
+        ),
         "paper_n_runs": _number("source method", "1", "number of runs of the method", "int32"),
         "paper_deviation": _number(
             "source method", "m", "standard deviation of the girder's vertical displacement"
         ),
         "check_kind": _code(
             "check",
-            "what is checked",
+            "kind of the check",
             (
                 "halves_agree",
                 "limit_against_baseline",
@@ -755,16 +756,16 @@ def _study_table() -> dict[str, Variable]:
                 "held_limit_against_baseline",
             ),
         ),
-        "check_case": _number("check", "1", "case that is checked, see flag_meanings", "int32"),
-        "check_method": _code("check", "method that is checked", METHODS),
-        "check_response": _code("check", "response that is checked", (*PAPER_RESPONSES, "none")),
+        "check_case": _number("check", "1", "checked case, see flag_meanings", "int32"),
+        "check_method": _code("check", "checked method", METHODS),
+        "check_response": _code("check", "checked response", (*PAPER_RESPONSES, "none")),
         "check_failure_probability": _number(
-            "check", "1", "failure probability of the limit, 0 where none is meant"
+            "check", "1", "failure probability of the limit, 0 where there is none"
         ),
         "check_value": _number(
             "check",
             "1",
-            "what is checked: a difference of limits over half the interval of the baseline's, "
+            "checked value: a difference of limits over half the interval of the baseline's, "
             "or a probability",
         ),
         "check_low": _number("check", "1", "least value that passes"),
@@ -911,7 +912,7 @@ LAYOUTS: Mapping[str, Layout] = {
         variables=(*_RUNS, "round_index", *_ROUNDS),
     ),
     "round": Layout(
-        title="What one round of a design added and decided",
+        title="One round of a design: its runs and its decision",
         variables=(*_RUNS, *_ROUNDS),
     ),
     "surrogate": Layout(
@@ -1011,7 +1012,7 @@ LAYOUTS: Mapping[str, Layout] = {
         ),
     ),
     "track_split": Layout(
-        title="What random gains and a random track contribute to the extremes",
+        title="Contributions of random gains and a random track to the extremes",
         variables=(
             "value",
             "density_both",
@@ -1022,7 +1023,7 @@ LAYOUTS: Mapping[str, Layout] = {
         ),
     ),
     "control_study": Layout(
-        title="What the control's circuits do to losses, deviations and limits",
+        title="Effect of the control circuits on losses, deviations and limits",
         variables=(
             *(
                 f"{kind}_{key}"
@@ -1039,7 +1040,7 @@ LAYOUTS: Mapping[str, Layout] = {
         variables=(*GAINS, "standard", "seed_of_track", "extreme", "status_on_track"),
     ),
     "line": Layout(
-        title="What holds on the line, and what on one of its tracks",
+        title="Densities, limits and shares of the variance on the line and on its tracks",
         variables=(
             "seed_of_track",
             "value",
@@ -1094,7 +1095,7 @@ LAYOUTS: Mapping[str, Layout] = {
         ),
     ),
 }
-"""What each kind of file holds, by its name."""
+"""Variables of each kind of file, by its name."""
 
 
 def describe(dataset: xr.Dataset) -> xr.Dataset:
@@ -1104,6 +1105,12 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
     ------
     ValueError
         If a variable is not in `VARIABLES` or stands on other dimensions than written there.
+
+    Examples
+    --------
+    >>> described = describe(xr.Dataset({"mass_per_length": 6000.0}))
+    >>> described["mass_per_length"].attrs["units"]
+    'kg m-1'
     """
     described = dataset.copy(deep=False)
     for name in described.variables:
@@ -1133,6 +1140,13 @@ def check(dataset: xr.Dataset, layout: str) -> None:
     ValueError
         If a variable is missing or unexpected, or has another unit or other dimensions than
         `VARIABLES` says.
+
+    Examples
+    --------
+    >>> check(xr.Dataset(), "points")
+    Traceback (most recent call last):
+        ...
+    ValueError: points: 'suspension_proportional_gain' is missing
     """
     mistake = _mistake(dataset, layout)
     if mistake is not None:
@@ -1178,7 +1192,13 @@ def provenance(
     code
         Fingerprint of the code that computed it.
     inputs
-        Files read, by the role they play.
+        Files read, by their role.
+
+    Examples
+    --------
+    >>> found = provenance("points", config={"seed": 3, "demonstration": False}, code="abc")
+    >>> found["seed"]
+    3
     """
     attributes: dict[str, str | int] = {
         "Conventions": CONVENTIONS,
@@ -1202,7 +1222,13 @@ def provenance(
 
 
 def carried(dataset: xr.Dataset) -> dict[str, Any]:
-    """Attributes that a file takes over from its sources: steps and track of the passages."""
+    """Attributes that a file takes over from its sources: steps and track of the passages.
+
+    Examples
+    --------
+    >>> carried(xr.Dataset(attrs={"track": "smooth track", "title": "Passage"}))
+    {'track': 'smooth track'}
+    """
     kept = ("time_step", "n_steps", "track")
     return {name: dataset.attrs[name] for name in kept if name in dataset.attrs}
 
@@ -1216,7 +1242,7 @@ def write(
     code: str,
     inputs: Mapping[str, str | Path] | None = None,
 ) -> None:
-    """Describe, check and write a dataset: the file appears whole or not at all.
+    """Describe, check and write a dataset; the file appears whole or not at all.
 
     The parameters beside ``dataset`` and ``path`` are those of `provenance`.
 
@@ -1233,10 +1259,19 @@ def write(
 
 
 def write_netcdf(dataset: xr.Dataset, path: str | Path) -> None:
-    """Write a described dataset aside and rename it into place, byte for byte reproducibly.
+    """Write a described dataset aside and rename it, byte for byte reproducibly.
 
     Variables are compressed (zlib 4, shuffled) in the type that `VARIABLES` names; attributes are
     written in alphabetical order.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "mass.nc"
+    ...     write_netcdf(describe(xr.Dataset({"mass_per_length": 6000.0})), path)
+    ...     xr.load_dataset(path)["mass_per_length"].attrs["long_name"]
+    'mass of the bridge per length, with rails'
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -1265,7 +1300,7 @@ def read(path: str | Path, layout: str) -> xr.Dataset:
     FileNotFoundError
         If there is no such file.
     PermissionError
-        If it must not be read.
+        If it may not be read.
     UserError
         If it is not NetCDF, or not of that layout, as `check` says.
     """

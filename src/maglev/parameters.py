@@ -45,10 +45,10 @@ SOURCES = {
     "D": "derived from the other sources",
     "A": "assumed",
 }
-"""What the source letters in the parameter tables stand for."""
+"""Meaning of the source letters in the parameter tables."""
 
 CONFIDENCE = {"H": "high", "M": "medium", "L": "low"}
-"""How far a value can be trusted."""
+"""Meaning of the letters of confidence."""
 
 
 @lru_cache(maxsize=1)
@@ -76,7 +76,7 @@ def quantity(
     unit
         SI unit of the stored number, in the notation of pint; ``""`` for a pure number.
     meaning
-        What the number is, with its symbol.
+        Meaning of the number, with its symbol.
     default
         Value in ``unit``, or a text with its own unit such as ``"430 km/h"``.
     source
@@ -120,7 +120,7 @@ _FACTORS = {
     ("ms", "s"): (1.0, 1000.0),
     ("kN", "N"): (1000.0, 1.0),
 }
-"""What a number in the first unit is multiplied with and divided by for the second."""
+"""Numerator and denominator of the factor from the first unit to the second."""
 
 
 def _unreadable() -> tuple[type[Exception], ...]:
@@ -329,7 +329,7 @@ class Magnet(Parameters):
     """A row of poles on one rigid magnet body, its suspension on the C-frames and its currents.
 
     The magnet hangs with both ends on neighbouring C-frames.  The gap of a pole is the mean over
-    its face, and so is its force on the rail.  Which poles share a circuit says ``control``.
+    its face, and so is its force on the rail.  ``control`` says which poles share a circuit.
     """
 
     mass: float = quantity("kg", "mass", 600, source="H", confidence="M", above=0)
@@ -386,7 +386,7 @@ class Magnet(Parameters):
     )
     preload: float | None = quantity(
         "N",
-        "force at rest; null: what the magnet carries of the train's weight",
+        "force at rest; null: the magnet's part of the train's weight",
         None,
         source="A",
         confidence="L",
@@ -760,7 +760,7 @@ class Irregularity(Parameters):
     )
     fade_in: float = quantity(
         "m",
-        "length before the guideway over which the irregularity grows from nothing",
+        "length before the guideway over which the irregularity grows from zero",
         50,
         source="A",
         confidence="L",
@@ -861,18 +861,19 @@ class Circuit(Parameters):
 
     ``pole``: every pole has a circuit of its own, fed by its own gap.  ``ends``: two a magnet, each
     fed by the gap at the outermost pole of its half.  ``half``: two a magnet, each fed by the mean
-    gap of its half.  ``lumped``: one a magnet, fed by the mean gap, which its force goes by too.
+    gap of its half.  ``lumped``: one a magnet, fed by the mean gap, from which its forces follow
+    too.
     """
 
     group: Group = Field(
         "pole",
-        description="who shares a circuit: each pole its own, each half fed at the magnet's end "
+        description="sharing of circuits: each pole its own, each half fed at the magnet's end "
         "(ends), each half fed by its mean gap (half), a magnet with one force (lumped)",
         json_schema_extra={"source": "A", "confidence": "L"},
     )
     lag: float = quantity(
         "s",
-        "time constant with which the current follows its command",
+        "time constant of the lag of the current behind its command",
         "0 ms",
         source="A",
         confidence="L",
@@ -1054,7 +1055,7 @@ class TailDesign(Parameters):
     n_candidates: int = _count(16_384, "Sobol' points that rounds choose from", minimum=8)
     batch_size: int = _count(8, "runs of one round")
     aggregate: Literal["sum", "maximum"] = Field(
-        "sum", description="how the gains of several limits become one score"
+        "sum", description="combination of the gains of several limits to one score"
     )
     threshold: float = Field(
         0.02,
@@ -1197,7 +1198,7 @@ class Case(Parameters):
 
 
 def _cases() -> dict[str, Case]:
-    """The cases of the paper, and those of who shares a circuit and how late its current comes."""
+    """The cases of the paper, and the variants of circuits, lags and delays."""
     cases = {"validation": Case(methods=("mcm", "osm", "asm_paper", "asm"))}
     for gain in GAIN_KEYS:
         cases[f"only_{gain}"] = Case(n_spans=20, random_gains=(gain,))
@@ -1234,7 +1235,7 @@ def _with_value(section: Any, keys: list[str], value: Any) -> Any:
 BORDER_OF_HALF = {"suspension": 1.246, "guidance": 1.396}
 """Least stable k_p over i0/delta0 where circuits are fed by the mean gap of their half: of one
 linearised car with the default masses and springs (docs/theory/control.md); of the other groups it
-is 1.  Another train has others, so that they serve for a first check only."""
+is 1.  Another train has other values; these serve for a first check only."""
 
 
 def _normal_cdf(u: float) -> float:
@@ -1300,39 +1301,40 @@ class Config(Parameters):
                 )
         return {name: case for name, case in cases.items() if case is not None}
 
-    def with_values(self, values: Mapping[str, Any], place: str = "") -> Config:
+    def with_values(self, values: Mapping[str, Any], prefix: str = "") -> Config:
         """Return the configuration with other values at dotted keys, written as in a file.
 
         Parameters
         ----------
         values
             Such as ``{"passage.speed": "500 km/h"}``.
-        place
-            What the keys belong to, for messages.
+        prefix
+            Text before each key in messages.
 
         Raises
         ------
         UserError
-            If a key is none of a case's, or its value will not do.
+            If a case cannot set the key, or the value is refused.
         """
         changed = self
         for dotted, value in values.items():
             keys = dotted.split(".")
             if keys[0] not in _OF_A_CASE or len(keys) < 2:
                 raise UserError(
-                    f"{place}{dotted} cannot be set for a case alone; the sections that can are "
+                    f"{prefix}{dotted} cannot be set for a case alone; the sections that can are "
                     f"{', '.join(_OF_A_CASE)}, such as passage.speed"
                 )
             if dotted == "guideway.n_spans":
-                raise UserError(f"{place}{dotted} is the case's n_spans: write it there")
+                raise UserError(f"{prefix}{dotted} is the case's n_spans: write it there")
             try:
                 changed = _with_value(changed, keys, value)
             except ValidationError as error:
                 why = error.errors()[0]["msg"].removeprefix("Value error, ")
-                raise UserError(f"{place}{dotted}: {why}") from None
+                raise UserError(f"{prefix}{dotted}: {why}") from None
             except KeyError as error:
                 raise UserError(
-                    f"{place}{dotted} is no key of the configuration: there is no {error.args[0]!r}"
+                    f"{prefix}{dotted} is no key of the configuration: "
+                    f"there is no {error.args[0]!r}"
                 ) from None
         return changed
 
@@ -1366,7 +1368,7 @@ class Config(Parameters):
         """Probability that the gains of a case can hold the train statically [-].
 
         A magnet pulls more the closer it is, so its k_p must exceed i₀/δ₀, times `BORDER_OF_HALF`
-        for the group ``half``, and its k_d must not be negative.  What lag and delay take away is
+        for the group ``half``, and its k_d must not be negative.  The effect of lag and delay is
         not in it.
 
         References

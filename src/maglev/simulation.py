@@ -78,12 +78,11 @@ def simulate(
     ------
     UserError
         If the gains have another shape or are not finite, the time step exceeds the stability
-        limit, the irregularity is shorter than the run, the solver is unknown, or the seeds are
-        not whole numbers from zero, one for each sample of the production solver.
+        limit, the irregularity does not cover the passage, the solver is unknown, or the seeds are
+        not whole numbers from zero, one for each sample of the production solver, or the reference
+        solver does not reach its accuracy.
     FileNotFoundError
         If the irregularity's file does not exist.
-    RuntimeError
-        If the reference solver does not reach its accuracy.
 
     References
     ----------
@@ -145,7 +144,7 @@ def track(config: Config, seed: int | None = None) -> Profile:
     Raises
     ------
     UserError, FileNotFoundError
-        If a measured profile cannot be read or is shorter than the run.
+        If a measured profile cannot be read or does not cover the passage.
 
     Examples
     --------

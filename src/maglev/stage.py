@@ -41,10 +41,10 @@ class Input:
     layout
         A key of `maglev.datasets.LAYOUTS`.
     by
-        Names that tell several files of the role apart, such as ``("method",)``: the stage is
+        Names that distinguish several files of the role, such as ``("method",)``: the stage is
         then given a mapping by such a name, or by tuples of names.  Empty for one file.
     methods
-        Methods for which a stage of a method is given the role.
+        Methods for which a stage of each method takes the role.
     optional
         Whether the stage also works without the file.
     """
@@ -73,13 +73,13 @@ class Stage:
     layout
         A key of `maglev.datasets.LAYOUTS`: what its file holds.
     compute
-        The function.  It is given the view of the configuration, then by name all of ``takes``
-        and ``inputs`` that there are, and returns the dataset.
+        The function.  It receives the view of the configuration, then by name the given ``takes``
+        and ``inputs``, and returns the dataset.
     takes
-        What it is given besides, with its type: ``case``, ``method``, ``store`` (folder in which
+        Further arguments with their types: ``case``, ``method``, ``store`` (folder in which
         runs are kept), ``n_threads``, or any other name, which is a wildcard of its rule.
     methods
-        Methods for which its file is made; of a stage of a case, of which the case needs one.
+        Methods for which its file is made; for a stage of each case, the case needs one of them.
     table
         From the described dataset to rows and text of a table that is written beside the file as
         CSV and Markdown.
@@ -149,7 +149,7 @@ class Stage:
         config
             The whole configuration.
         case, method
-            Names of the case and the method, where what it reads depends on them.
+            Names of the case and the method, where its keys depend on them.
 
         Returns
         -------
@@ -215,7 +215,7 @@ class Stage:
         path
             File to write.
         config
-            What it was computed from.
+            Configuration behind the dataset.
         inputs
             Files it was computed from, by their role.
         case, method
@@ -246,8 +246,8 @@ class UndeclaredKeyError(LookupError):
 class View:
     """A section of the configuration restricted to the declared keys of a stage.
 
-    It serves in place of the section: methods and properties of the section see the view.  Two
-    views are equal if all they can be asked for is equal, files that it names by their bytes.
+    It replaces the section: methods and properties of the section see the view.  Two views are
+    equal if all their declared values are equal, and named files by their bytes.
 
     Parameters
     ----------
@@ -257,8 +257,8 @@ class View:
         The configuration or a part of it.
     reads
         Dotted keys inside the section that may be read.
-    place
-        Dotted place of the section in the configuration, with a dot behind it.
+    prefix
+        Dotted key of the section in the configuration, with a dot behind it.
     files
         Hashes of the files that are named in it.
     """
@@ -268,11 +268,11 @@ class View:
         stage: str,
         section: Parameters | Mapping[str, Any],
         reads: tuple[str, ...],
-        place: str = "",
+        prefix: str = "",
         files: tuple[tuple[str, str], ...] = (),
     ) -> None:
         self._stage, self._section, self._reads = stage, section, reads
-        self._place, self._files = place, files
+        self._prefix, self._files = prefix, files
 
     def _read(self, name: str) -> Any:
         section = self._section
@@ -283,10 +283,10 @@ class View:
         inside = tuple(one.removeprefix(prefix) for one in self._reads if one.startswith(prefix))
         if not inside:
             raise UndeclaredKeyError(
-                f"the stage '{self._stage}' reads {self._place}{name}, which it has not declared; "
+                f"the stage '{self._stage}' reads {self._prefix}{name}, which it has not declared; "
                 f"add it to 'reads' of STAGE in maglev/stages/{self._stage}.py"
             )
-        return View(self._stage, value, inside, f"{self._place}{prefix}")
+        return View(self._stage, value, inside, f"{self._prefix}{prefix}")
 
     def __getattr__(self, name: str) -> Any:
         section = self.__dict__.get("_section")
@@ -316,10 +316,10 @@ class View:
             self._read(name)
         assert isinstance(self._section, Parameters)
         changed = self._section.model_copy(update=update)
-        return View(self._stage, changed, self._reads, self._place, self._files)
+        return View(self._stage, changed, self._reads, self._prefix, self._files)
 
     def with_case_set(self, _name: str) -> View:
-        """The view itself: a case's own values are in their sections since it was made."""
+        """The view itself, in whose sections a case's own values already are."""
         return self
 
     def quantities(self) -> dict[str, Any]:
@@ -350,12 +350,24 @@ def _chosen(whole: Mapping[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
 
 
 def flag(name: str) -> str:
-    """An option as it stands on the command line, such as ``--threads`` for ``n_threads``."""
+    """An option as it stands on the command line, such as ``--threads`` for ``n_threads``.
+
+    Examples
+    --------
+    >>> flag("n_threads")
+    '--threads'
+    """
     return f"--{name.removeprefix('n_').replace('_', '-')}"
 
 
 def summary(name: str) -> str | None:
-    """First sentence of the module of a stage, read without importing it; None if there is none."""
+    """First sentence of the module of a stage, read without importing it; None if there is none.
+
+    Examples
+    --------
+    >>> summary("passage")
+    'One passage at the mean gains, with its histories.'
+    """
     path = _FOLDER / f"{name}.py"
     tree = ast.parse(path.read_text(encoding="utf-8")) if path.is_file() else ast.Module([], [])
     targets = [each for node in tree.body if isinstance(node, ast.Assign) for each in node.targets]
@@ -365,17 +377,35 @@ def summary(name: str) -> str | None:
 
 
 def summaries() -> dict[str, str]:
-    """Summary of each stage by its name."""
+    """Summary of each stage by its name.
+
+    Examples
+    --------
+    >>> "passage" in summaries()
+    True
+    """
     found = {path.stem: summary(path.stem) for path in sorted(_FOLDER.glob("*.py"))}
     return {name: words for name, words in found.items() if words is not None}
 
 
 def named(name: str) -> Stage:
-    """The stage of a name."""
+    """The stage of a name.
+
+    Examples
+    --------
+    >>> named("passage").layout
+    'passage'
+    """
     stage: Stage = import_module(f"maglev.stages.{name}").STAGE
     return stage
 
 
 def stages() -> dict[str, Stage]:
-    """All stages by their names; imports every module of a stage."""
+    """All stages by their names; imports every module of a stage.
+
+    Examples
+    --------
+    >>> stages().keys() == summaries().keys()
+    True
+    """
     return {name: named(name) for name in summaries()}

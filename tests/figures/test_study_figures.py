@@ -11,7 +11,17 @@ from numpy.testing import assert_allclose
 from test_figures import VALIDATION
 
 from maglev import datasets
-from maglev.figures import FIGURES, curves, draw, labels, layouts_of, stability, style
+from maglev.figures import (
+    FIGURES,
+    curves,
+    density_by_control,
+    draw,
+    labels,
+    layouts_of,
+    limits_by_control,
+    stability,
+    style,
+)
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +120,57 @@ def test_a_range_holds_the_body_and_leaves_out_the_tail(files):
     width = study_files.WIDTH[2]
     assert study_files.CENTRE[2] - 4.5 * width < low < study_files.CENTRE[2] - 2.3 * width
     assert study_files.CENTRE[2] + 2.3 * width < high < study_files.CENTRE[2] + 4.5 * width
+
+
+def second_far_away(paths, layout, variables):
+    """Files of which the second has values that lie 1 m/s² above those of the others."""
+    found = read(paths, layout)
+    for name in variables:
+        found[1][name][:] = found[1][name] + 1.0
+    return found
+
+
+def test_a_density_far_from_all_others_is_noted_and_does_not_squeeze_them(files):
+    paths = files["density_by_control"]
+    n = len(paths) // 2
+    densities = second_far_away(paths[:n], "density", ["value"])
+    far = curves.apart(curves.densities(densities), 2)
+    assert far.tolist() == [k == 1 for k in range(n)]
+    fig, _ = density_by_control.figure(densities, read(paths[n:], "design"))
+    panel = fig.axes[2]
+    assert panel.get_xlim()[1] < study_files.CENTRE[2] + 0.5
+    assert len(panel.get_lines()) == n - 1
+    (note,) = (text.get_text() for text in panel.texts)
+    assert note.startswith("off the panel: 1.")
+
+
+def test_limits_far_from_all_others_are_noted_and_do_not_squeeze_them(files):
+    paths = files["limits_by_control"]
+    n = len(paths) // 2
+    names = [f"{kind}limit{end}" for kind in ("", "held_") for end in ("", "_low", "_high")]
+    limits = second_far_away(paths[:n], "limits", names)
+    fig, _ = limits_by_control.figure(limits, read(paths[n:], "design"))
+    panel = fig.axes[2]
+    assert panel.get_ylim()[1] < study_files.CENTRE[2] + 0.7
+    assert [text.get_text()[:14] for text in panel.texts] == ["off the panel:"]
+
+
+def test_the_shading_of_the_map_ends_at_the_border_that_parts_it(files):
+    border, runs = (
+        datasets.read(path, layout)
+        for path, layout in zip(files["stability"], ("stability", "runs"), strict=True)
+    )
+    x = border["grid_proportional"].to_numpy()
+    middle = 0.5 * (x[3] + x[4])
+    border["growth_rate"][:] = np.where(x < middle, 1.0, -1.0)
+    for parted in (True, False):
+        border["proportional_border"][0] = middle if parted else x[1]
+        border["proportional_border"][1] = np.nan
+        chart = stability.figure(border, runs)[0].axes[0]
+        clips = [one.get_clip_path() for one in chart.collections]
+        ends = [path.get_fully_transformed_path() for path in clips if path is not None]
+        edges = [chart.transData.inverted().transform(end.vertices)[:, 0].max() for end in ends]
+        assert (np.isclose(edges, middle).any()) == parted
 
 
 def test_shares_are_written_with_two_digits():

@@ -6,7 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import signal
 
 from maglev.compiled import kernel
-from maglev.mechanics import _comfort, comfort, integrate, irregularity, packing
+from maglev.mechanics import _comfort, comfort, packing
+from maglev.mechanics._kernels import at_rest
 from maglev.mechanics.comfort import (
     ISO_LATERAL,
     ISO_VERTICAL,
@@ -16,9 +17,10 @@ from maglev.mechanics.comfort import (
     sperling_index,
     sperling_weight,
 )
-from maglev.mechanics.course import course, track_range
+from maglev.mechanics.course import course
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
+from passages import system_of
 
 ISO_TABLE = {
     # centre of the third of an octave [Hz]: W_k and W_d in thousandths, ISO 2631-1:1997 table 3
@@ -78,15 +80,8 @@ def test_readings_every_1_6_ms_change_the_weighting_by_little(number):
     assert np.abs(off[f < 10.0]).max() < 2e-3
 
 
-def short_system():
-    config = Config.model_validate(
-        {"train": {"n_cars": 2}, "guideway": {"n_spans": 1}, "passage": {"mode_cutoff": "120 Hz"}}
-    )
-    profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
-    return config, integrate.prepare(config, profile)
-
-
-CONFIG, SYSTEM = short_system()
+CONFIG = Config.model_validate({"train": {"n_cars": 2}, "guideway": {"n_spans": 1}})
+SYSTEM = system_of(CONFIG)
 AMPLITUDE = {"body_z": 0.3, "body_pitch": 0.02, "body_y": 0.2, "body_yaw": -0.01}
 """Of the sines by which the cars' bodies move [m/s², rad/s²]."""
 
@@ -103,20 +98,18 @@ def rest(comfort_record, n_cars):
 
 def squares_of(frequency):
     """Squares that the kernel adds up while bodies swing with a frequency of their own a lane."""
-    from maglev.mechanics._kernels import at_rest
-
-    run = packing.run(CONFIG, 0)
-    outcome = packing.empty_outcome(SYSTEM.train, (SYSTEM.suspension, SYSTEM.guidance), run)
-    weighing, train = rest(run.comfort, 2), at_rest(SYSTEM.vehicle.inverse_mass.size)
-    omega, dt = 2 * np.pi * frequency, run.time_step
-    for step in range(1, run.n_steps + 1):
+    timing = packing.timing(CONFIG, 0)
+    outcome = packing.empty_outcome(SYSTEM.train, (SYSTEM.suspension, SYSTEM.guidance), timing)
+    weighing, train = rest(timing.comfort, 2), at_rest(SYSTEM.vehicle.inverse_mass.size)
+    omega, dt = 2 * np.pi * frequency, timing.time_step
+    for step in range(1, timing.n_steps + 1):
         half = (step - 0.5) * dt  # the velocity whose change is the acceleration of full steps
         swing = (np.cos(omega * 0.5 * dt) - np.cos(omega * half)) / (
             2 * np.sin(omega * 0.5 * dt) / dt
         )
         for name, amplitude in AMPLITUDE.items():
             train.velocity[getattr(SYSTEM.vehicle, name)] = amplitude * swing
-        read_step(run.comfort, SYSTEM.vehicle, step, dt, train, weighing, outcome)
+        read_step(timing.comfort, SYSTEM.vehicle, step, dt, train, weighing, outcome)
     return outcome.squares.reshape(4, 2, 2, LANES)
 
 

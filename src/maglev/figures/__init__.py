@@ -35,8 +35,8 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
 }
 """Every figure with the layouts of the files that it is drawn from, in order.
 
-A star stands for any number of files of that layout; two stars in one figure, for equally many,
-first all of the one, then all of the other."""
+A star stands for any number of files of that layout; two stars stand for equally many files, first
+all of the one layout, then all of the other."""
 
 
 def layouts_of(name: str, n_files: int) -> list[tuple[str, ...]]:

@@ -34,10 +34,8 @@ def figure(
         looks.append(look)
         words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
     fig, panels = labels.response_panels(4.7)
-    for response, axis, shown in panels:
-        curves.draw_densities(axis, found, response, looks)
-        low, high = curves.body(found, response, 5e-3)
-        axis.set_xlim(shown.scale * low, shown.scale * high)
+    for response, axis, _ in panels:
+        curves.draw_densities(axis, found, response, looks, curves.body(found, response, 5e-3))
     style.below(
         fig,
         panels[0][1].get_lines(),

@@ -47,10 +47,8 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         {**labels.METHOD_STYLE[name], "label": labels.PDEM[name], "lw": 1.6 - 0.3 * (name != "mcm")}
         for name in methods
     ]
-    curves.draw_densities(axis, found, _RESPONSE, looks)
     shown = labels.SHOWN[_RESPONSE]
-    low, high = curves.body(found, _RESPONSE, 2e-3)
-    axis.set_xlim(shown.scale * low, shown.scale * high)
+    curves.draw_densities(axis, found, _RESPONSE, looks, curves.body(found, _RESPONSE, 2e-3))
     style.titled(axis, "a", shown.name)
 
     at = found.isel(response=_RESPONSE)
@@ -83,7 +81,7 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
     style.table(
         table,
         rows,
-        (0.0, 0.33, 0.46, 0.60, 0.75, 0.89),
+        (0.0, 0.24, 0.37, 0.51, 0.67, 0.82),
         [look["color"] for look in looks],
         0.155,
     )

@@ -77,7 +77,7 @@ METHOD = {"mcm": "MCM", "osm": "OSM", "asm_paper": "ASM (paper)", "asm": "ASM (o
 """The methods in short."""
 
 PDEM = {"mcm": "MCM", "osm": "OSM-PDEM", "asm_paper": "ASM-PDEM (paper)", "asm": "ASM-PDEM (ours)"}
-"""The same for what is found with the density evolution."""
+"""The methods in short, with the density evolution."""
 
 METHOD_STYLE: dict[str, style.Look] = {
     "mcm": {"color": "#000000", "ls": "-"},

@@ -16,7 +16,7 @@ _LINE: style.Look = {"color": "#000000", "lw": 1.4}
 def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     """Draw each track's part of the density of the line, and the shares of the variance.
 
-    A track's density is over the number of tracks: the line's is the sum of all that are drawn.
+    A track's density is divided by the number of tracks, so that the line's is the sum of all.
 
     Parameters
     ----------

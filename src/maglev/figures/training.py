@@ -20,7 +20,7 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
     Parameters
     ----------
     accuracy
-        Layout ``accuracy``: serves the designs made in one stage, by their first samples.
+        Layout ``accuracy``: for the designs made in one stage, by their first samples.
     designs
         Layout ``design``, of the methods of the same case.
 
@@ -94,7 +94,7 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
 def _rounds(accuracy: xr.Dataset, design: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Number of runs (round,), errors against the baseline and at the next runs of a design.
 
-    An error of a round is that of the predictions before it, so it stands at the number of runs
+    The error of a round is that of the predictions before it, and stands at the number of runs
     before it.
     """
     if design.sizes["round"] > 1:

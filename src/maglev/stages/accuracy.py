@@ -20,7 +20,7 @@ from maglev.vocabulary import METHODS, PAPER_RESPONSES
 _LOG = logging.getLogger(__name__)
 
 N_STEPS = 12
-"""Numbers of runs at which a method is judged, about; assumed."""
+"""Approximate number of sizes at which a method is judged; assumed."""
 
 PAPER_N_RUNS = 273
 """Number of runs for which the paper gives root mean square errors."""
@@ -61,9 +61,9 @@ def steps(designs: Mapping[str, xr.Dataset]) -> dict[str, list[int]]:
 def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Compare every method with the baseline for growing numbers of runs.
 
-    Surrogates are evaluated at the baseline's own points, so that its sampling noise, which both
-    have in common, is not in the differences.  It is in the truth: half the interval of each of
-    the baseline's limits stands beside them.
+    Surrogates are evaluated at the points of the baseline, so its sampling noise cancels in the
+    differences.  The noise of the baseline's limits themselves is half their interval, which the
+    file also holds.
 
     Parameters
     ----------

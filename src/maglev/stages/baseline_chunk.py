@@ -28,7 +28,7 @@ def dataset(
     case
         Name of the case.
     start, stop
-        Number of the first sample and of that after the last; how many the baseline has plays no
+        Number of the first sample and of the one after the last; the size of the baseline plays no
         part.
     store
         Folder of the store.

@@ -47,7 +47,7 @@ def dataset(
     limits
         Layout ``limits``, by case and method.
     baseline
-        Layout ``runs``, by case: where deviations are counted.
+        Layout ``runs``, by case: deviations are those of these runs.
 
     Returns
     -------

@@ -1,9 +1,9 @@
 """Designs: training runs of a surrogate, in one stage or in adaptive rounds.
 
 An adaptive design is a fold over its rounds.  Each round is written to the store as a small file of
-its own before the next begins; to resume is to read them once more.  When to stop is decided from
-this history alone, so another threshold or another largest number of runs continues or shortens
-what is stored, without a run of the model.
+its own before the next begins; to resume is to read them once more.  This history alone decides
+when to stop, so another threshold or another largest number of runs continues or shortens the
+stored design, without a run of the model.
 """
 
 from __future__ import annotations
@@ -73,9 +73,9 @@ def dataset(
     initial_points
         Layout ``points``: the first design.
     candidate_points
-        Layout ``points``: what the rounds of an adaptive method choose from.
+        Layout ``points``: candidates of the rounds of an adaptive method.
     baseline
-        Layout ``runs``: what the surrogate of each round is compared with.
+        Layout ``runs``: the surrogate of each round is compared with it.
     store
         Folder of the store of runs and rounds.
     n_threads

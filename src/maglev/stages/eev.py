@@ -34,8 +34,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``eev``.  Extremes are predicted at every point, also where it is likely lost: there
-        they mean nothing, see ``lost_probability_at``.
+        Layout ``eev``.  Extremes are predicted at every point; where it is likely lost
+        (``lost_probability_at``), they mean nothing.
     """
     found = stored_predictor(config, design, surrogate)
     points = representative_points

@@ -94,9 +94,9 @@ def baseline_limits(config: Config, values: FloatArray, away: np.ndarray) -> lis
     config
         The configuration: levels and confidence.
     values : (sample, response)
-        Extremes [their unit], anything where ``away``.
+        Extremes [their unit]; any value where ``away``.
     away : (sample,) of bool
-        Which samples were lost.
+        Whether each sample was lost.
     """
     return [
         sample_limits(
@@ -114,7 +114,7 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
 
     The population is a scrambled Sobol' set taken for independent draws, which makes the sampling
     part of the interval too wide rather than too narrow.  Where no run was lost, the probability
-    of loss enters the limits as zero; what is not known about it stands in its own interval.
+    of loss enters the limits as zero; its own interval states its uncertainty.
 
     Parameters
     ----------

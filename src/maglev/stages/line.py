@@ -24,26 +24,26 @@ from maglev.vocabulary import GAIN_KEYS, GIVEN, LIMIT_STATUS, PAPER_RESPONSES, R
 _LOG = logging.getLogger(__name__)
 
 N_POINTS = 2**15
-"""Points at which the surrogate of each track is read; assumed: 33 of them lie beyond a limit at
-1e-3, and the intervals count their sampling."""
+"""Points at which the surrogate of each track is evaluated; assumed: 33 of them lie beyond a limit
+at 1e-3, and the intervals include their sampling."""
 
 N_CELLS = 1001
-"""Places at which densities are given; assumed: a few in the kernel of the narrowest track."""
+"""Values at which densities are given [-]; assumed: a few per kernel of the narrowest track."""
 
 REACH = 4.0
-"""Bandwidths of the widest track beyond the smallest and the largest value."""
+"""Margin beyond the smallest and the largest value, in bandwidths of the widest track."""
 
 NARROW = 0.4
-"""Share of the gains' variation at which limits are read again: 0.04 where they vary by 0.10, as at
-the two ends of the paper's range up to there.  Within the runs' range, so nothing is extrapolated.
+"""Share of the gains' variation of a second set of limits: 0.04 where gains vary by 0.10, the ends
+of the paper's range.  It lies within the range of the runs, so nothing is extrapolated.
 """
 
 
 def dataset(config: Config, tracks: xr.Dataset) -> xr.Dataset:
     """Shares of the variance, densities and limits of the line and of each track.
 
-    Points of the gains at which levitation is lost on any track are left out: all but the lost
-    shares is given that it holds.
+    Points of the gains at which levitation is lost on any track are left out: all results but the
+    lost shares hold given that levitation holds.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ _DIMS = {
 
 
 def _densities(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Places (cell,) and the density (track, cell) on each track, of values (track, sample)."""
+    """Values (cell,) and the density (track, cell) on each track, of values (track, sample)."""
     width = [silverman_bandwidth(one) for one in values]
     reach = REACH * max(width)
     at = np.linspace(values.min() - reach, values.max() + reach, N_CELLS)

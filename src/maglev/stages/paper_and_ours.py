@@ -15,7 +15,7 @@ from maglev.stages.tables import markdown, number, of_track
 from maglev.vocabulary import DECISIONS, METHODS, PAPER_RESPONSES, SOURCES
 
 RESPONSE = "girder_displacement_z"
-"""The response that the paper's surviving numbers speak of."""
+"""Response of the paper's numbers."""
 
 PAPER_PEAK = {"mcm": 6.37e4, "osm": 6.01e4, "asm_paper": 6.44e4}
 """Largest densities in the paper's Fig. 11 [1/m]."""
@@ -27,7 +27,7 @@ PAPER_RMSE = {"osm": 1.34e-5, "asm_paper": 1e-6}
 """Root mean square errors at 273 runs in the paper's Fig. 9 [m]; that of ASM is an upper bound."""
 
 PAPER_RMSE_N_RUNS = 273
-"""Number of runs behind ``PAPER_RMSE``."""
+"""Number of runs of ``PAPER_RMSE``."""
 
 PAPER_N_RUNS = {"mcm": 10_000, "osm": 363, "asm_paper": 363}
 """Runs of the model for the displacement in the paper."""
@@ -60,8 +60,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``paper_and_ours``; the attribute ``why_different`` of each variable says what the
-        numbers of these files say about the difference.  NaN or 0 where there is no number.
+        Layout ``paper_and_ours``; the attribute ``why_different`` of each variable explains the
+        difference by the numbers of these files.  NaN or 0 where there is no number.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Random gains of a case: their columns, their distributions and their points.
 
-Every set draws from random numbers of its own, which the seed and the name of the set decide.  The
-names of the cases play no part: with the same random gains, all cases have the same points in
-standard form.
+Every set has a random stream of its own, given by the seed and the name of the set.  The names of
+the cases play no part: with the same random gains, all cases have the same points in standard
+form.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def baseline(config: Config, case: str, n: int, stream: str = "baseline") -> Flo
 
 
 def track_seeds(config: Config, n: int, stream: str = "track") -> IntArray:
-    """Seeds (sample,) of the irregularities that the samples meet; seed i does not depend on n."""
+    """Seeds (sample,) of the irregularity of each sample; seed i does not depend on ``n``."""
     return generator(config.seed, stream).integers(0, 2**31, size=n)
 
 
@@ -117,7 +117,7 @@ def dataset(config: Config, case: str, points: PointSet) -> xr.Dataset:
     case
         Name of the case.
     points
-        In the random gains of the case.
+        Points of the random gains of the case.
     """
     gains = gains_at(config, case, points.standard)
     return xr.Dataset(
@@ -147,7 +147,7 @@ def gf_set(config: Config, case: str, n: int, key: str) -> PointSet:
     n
         Number of points.
     key
-        What the random numbers belong to.
+        Purpose of the random numbers, see `maglev.stages.randomness.generator`.
 
     References
     ----------

@@ -41,8 +41,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``prediction``.  ``computed`` is NaN where the run lost levitation; extremes are
-        predicted there too and mean nothing.
+        Layout ``prediction``.  ``computed`` is NaN where the run lost levitation; the predicted
+        extremes mean nothing there.
 
     Raises
     ------

@@ -15,13 +15,13 @@ RUNS_OF_CASE = (
     "cases.{case}.random_gains",
     "cases.{case}.random_track",
 )
-"""What the runs of a case depend on."""
+"""Keys that decide the runs of a case."""
 
 MEASURED = ("validation.measurements", "validation.measured_here")
-"""Whether and where there are measurements of the bridge."""
+"""Keys of the measurements on the guideway."""
 
 N_SAMPLES = ("study.mcm.n_samples", "cases.{case}.n_samples")
-"""What the size of a baseline depends on."""
+"""Keys that decide the size of a baseline."""
 
 RANDOM_GAINS = (
     "seed",
@@ -36,10 +36,10 @@ RANDOM_GAINS = (
     "passage.gap_contact",
     "passage.gap_lost",
 )
-"""What points of a case are drawn by."""
+"""Keys that decide the points of a case."""
 
 PREDICTING = ("seed", "study.confidence", "study.n_population")
-"""What a predictor is made with, beside the kind of its surrogate."""
+"""Keys of a predictor, without the kind of its surrogate."""
 
 SURROGATE_OF_METHODS = tuple(f"study.{method}.surrogate" for method in DESIGNED)
 """The kind of surrogate of every method."""

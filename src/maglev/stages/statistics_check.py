@@ -38,13 +38,13 @@ class Check:
     kind
         ``HALVES``, ``LIMIT``, ``LOSS``, ``HELD_HALVES`` or ``HELD_LIMIT``.
     case, method
-        What was checked.
+        Checked case and method.
     response
-        Number of the response, or how many there are for none.
+        Number of the response; the number of responses stands for none.
     level
         Failure probability, 0 for none [-].
     value, low, high
-        What was found and the ends of what passes [-]; NaN where nothing can be said.
+        Value and ends of the range that passes [-]; NaN where the check cannot be decided.
     passed
         ``NO``, ``YES`` or ``UNDECIDED``.
     """
@@ -67,11 +67,11 @@ def dataset(
 ) -> xr.Dataset:
     """Check every case that has a baseline.
 
-    Three kinds: the limits of the baseline's two halves, their difference over the sum of those
-    parts of their intervals that face each other, which passes if the intervals meet; each
-    method's limit less the baseline's over half the interval of the latter, which passes within
-    one; each method's probability of loss, which passes within the binomial interval of the
-    baseline's count.  The first two are repeated for limits given that levitation holds.
+    There are three kinds.  The limits of the baseline's two halves: their difference over the sum
+    of the facing parts of their intervals passes if the intervals meet.  Each method's limit: its
+    difference from the baseline's over half the interval of the latter passes within one.  Each
+    method's probability of loss: it passes within the binomial interval of the baseline's count.
+    The first two are repeated for limits given that levitation holds.
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``statistics_check``.  A check that cannot be decided (a limit that the sample does
-        not carry) says so; one that fails is reported, not raised.
+        Layout ``statistics_check``.  A check of a limit that the sample does not carry is
+        undecided; one that fails is reported, not raised.
 
     Raises
     ------

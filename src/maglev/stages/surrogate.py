@@ -32,7 +32,7 @@ class Predictor:
     surrogate
         Surrogate of the six responses on the samples that held.
     loss
-        Probability of lost levitation, and where.
+        Probability of loss, and the region of lost samples.
     """
 
     surrogate: Selected
@@ -96,7 +96,7 @@ def dataset(config: Config, method: str, design: xr.Dataset) -> xr.Dataset:
     config
         The configuration.
     method
-        ``"osm"``, ``"asm_paper"`` or ``"asm"``: says which surrogate.
+        ``"osm"``, ``"asm_paper"`` or ``"asm"``: it decides the kind of surrogate.
     design
         Layout ``design``.
 

@@ -154,7 +154,7 @@ def text(table: xr.Dataset, heading: str) -> str:
 
 
 def _cell(row: Mapping[str, object], prefix: str) -> str:
-    """A limit with its interval, or why there is none."""
+    """A limit with its interval, or the reason for none."""
     status = row[f"{prefix}status"]
     if status == INFINITE:
         return "none, losses are likelier"

@@ -1,6 +1,6 @@
 """Compiled steps of the generalised density evolution equation.
 
-Callers check; nothing here does.  Theory: docs/theory/pdem.md.
+Callers check the arguments.  Theory: docs/theory/pdem.md.
 """
 
 import numpy as np
@@ -111,7 +111,7 @@ def evolve(
     substeps
         Number of equal substeps in every interval.
     start, target : (sample,)
-        Place where a point starts, and where its kernel's spread is measured from [cell]; whole
+        Start of each point, and centre about which its kernel's spread is measured [cell]; whole
         numbers are cell centres.
     probability : (sample,)
         Assigned probabilities [-].

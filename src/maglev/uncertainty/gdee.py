@@ -1,7 +1,7 @@
 """Probability density evolution: from weighted extreme values to their density.
 
-The finite-difference solution adds a numerical kernel to the weighted points and nothing else, so
-the mesh is the bandwidth; it is chosen by a rule here.  Theory: docs/theory/pdem.md.
+The finite-difference solution smooths the weighted points by a numerical kernel, so the mesh acts
+as a bandwidth; a rule chooses it here.  Theory: docs/theory/pdem.md.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ _LIMITERS = {
 }
 
 COURANT = 0.9
-"""Largest Courant number the time step aims at [-]; 1 would be exact for one point.  Assumed."""
+"""Courant number that the time step aims at [-]; 1 would be exact for one point.  Assumed."""
 
 START = 3.0
-"""How far below the smallest value a virtual process starts [standard deviations].
+"""Distance below the smallest value at which a virtual process starts [standard deviations].
 
 A process that starts among the values moves those near its start too little for the scheme to
 spread them, and the density keeps their spikes.  Assumed; see docs/theory/pdem.md, section 4.
@@ -73,9 +73,9 @@ class EvolvedDensity:
     largest_courant
         Largest Courant number of any point and step [-].
     bandwidth
-        Kernel deviation the mesh rule asked for, Silverman's [unit].
+        Kernel deviation that the rule of the mesh aims at, Silverman's [unit].
     kernel_deviation
-        Root mean square deviation of the numerical kernel that came out [unit].
+        Root mean square deviation of the resulting numerical kernel [unit].
     start
         Value at which the virtual process starts [unit].
     """
@@ -103,7 +103,7 @@ class FirstPassage:
     cell_centre : (cell,)
         Centres of the cells [unit of the histories].
     density : (cell,)
-        Density of what remains at the last time [1/unit]; its integral is the last ``survival``.
+        Density that remains at the last time [1/unit]; its integral is the last ``survival``.
     mesh
         Cell width used [unit].
     """
@@ -154,7 +154,7 @@ def evolved_density(
     Returns
     -------
     evolved
-        The density with the mesh, the step and the kernel that made it.
+        The density with its mesh, step and kernel.
 
     Raises
     ------
@@ -213,10 +213,10 @@ def density_with_strays(
     *,
     lost_probability: float = 0.0,
 ) -> tuple[EvolvedDensity, bool] | None:
-    """Density of the values by PDEM; if they spread too far, of their logarithms.
+    """Density of the values by PDEM, or of their logarithms if the values spread too far.
 
-    A few values far out ask for more time steps than are sensible.  The logarithms of positive
-    values may not; their density p_L is mapped back by ``p(y) = p_L(ln y) / y``.
+    A few values far out need too many time steps.  The logarithms of positive values may need
+    fewer; their density p_L is mapped back by ``p(y) = p_L(ln y) / y``.
 
     Parameters
     ----------
@@ -226,9 +226,9 @@ def density_with_strays(
     Returns
     -------
     evolved, logarithmic
-        The density and whether it went by the logarithm: ``mesh``, ``bandwidth`` and
+        The density and whether it was found by the logarithm: ``mesh``, ``bandwidth`` and
         ``kernel_deviation`` are then those at the mean of the values, and the cells grow with the
-        value.  None if the evolution refuses both: `direct_density` is what is left.
+        value.  None if the evolution refuses both; `direct_density` then remains.
 
     Raises
     ------
@@ -289,8 +289,8 @@ def direct_density(
 
     Parameters
     ----------
-    at : (place,)
-        Where the density is wanted [unit of the value].
+    at : (value,)
+        Values at which the density is wanted [unit of the value].
     values : (sample,)
         Extreme values of the held samples [their unit].
     probability : (sample,), optional
@@ -302,13 +302,13 @@ def direct_density(
 
     Returns
     -------
-    density : (place,)
+    density : (value,)
         Density of the held part [1/unit]; its integral is one less ``lost_probability``.
 
     Raises
     ------
     UserError
-        If the sample is faulty or constant, ``bandwidth`` is not positive, a place is not finite
+        If the sample is faulty or constant, ``bandwidth`` is not positive, a value is not finite
         or ``lost_probability`` lies outside [0, 1).
 
     References
@@ -326,7 +326,7 @@ def direct_density(
     check_lost_probability(lost_probability)
     at = np.asarray(at, dtype=float)
     if at.ndim != 1 or not np.all(np.isfinite(at)):
-        raise UserError(f"places must be finite and have shape (place,), got shape {at.shape}")
+        raise UserError(f"values must be finite and have shape (value,), got shape {at.shape}")
     mean, deviation = _moments(values, probability)
     if bandwidth is None:
         bandwidth = silverman_bandwidth(values, probability)
@@ -356,13 +356,13 @@ def direct_density_band(
 
     Parameters
     ----------
-    at : (place,)
-        Where the density is given [unit of the value].
+    at : (value,)
+        Values at which the density is given [unit of the value].
     values : (sample,)
         Values that held [their unit].
     n
         Number of all runs.
-    density : (place,)
+    density : (value,)
         The direct density [1/unit].
     bandwidth
         Its kernel deviation h [unit].
@@ -373,7 +373,7 @@ def direct_density_band(
 
     Returns
     -------
-    low, high : (place,)
+    low, high : (value,)
         Ends of the band [1/unit]; the lower one is at least 0.
 
     References
@@ -452,8 +452,8 @@ def first_passage(
 ) -> FirstPassage:
     """Survival of weighted histories between barriers, by the GDEE with absorbing boundaries.
 
-    Probability that reaches a barrier is taken out and does not come back.  Histories are straight
-    between the given times, and those intervals are divided as the Courant number asks.  The
+    Probability that reaches a barrier is removed for good.  Histories are straight
+    between the given times, and those intervals are divided as the Courant number requires.  The
     kernel reaches a barrier about its own width early: compare ``exact_survival``.
 
     Parameters
@@ -472,7 +472,7 @@ def first_passage(
     Returns
     -------
     passage
-        Survival over time and the density of what remains.
+        Survival over time and the remaining density.
 
     Raises
     ------
