@@ -15,6 +15,7 @@ from maglev.config import (
 )
 from maglev.fingerprint import code_of
 from maglev.stage import flag, stages, summaries
+from maglev.stages.paper_and_ours import RESPONSE
 from maglev.stages.points import n_samples
 from maglev.vocabulary import BASELINE, DESIGNED, METHODS, TRACK_PARTS
 
@@ -65,6 +66,6 @@ rule truth:
         [
             file_of(stage, case=case, method=BASELINE)
             for stage in ("baseline", "density", "limits")
-            for case in parameters.cases
+            for case in CASES
         ],
         file_of("statistics_check", scope="statistics_truth"),

@@ -78,7 +78,8 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
 def overlay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Lay one nested mapping over another, key by key; neither is changed.
 
-    A spectrum of another law replaces the one below it as a whole.
+    A spectrum of another law replaces the one below it as a whole, and so does a limit state that
+    says all of itself: a response with its limit, or what it joins.
 
     Examples
     --------
@@ -90,10 +91,16 @@ def overlay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         below = merged.get(key)
         if isinstance(below, Mapping) and isinstance(value, Mapping):
             same_law = value.get("law", below.get("law")) == below.get("law")
-            merged[key] = overlay(below, value) if same_law else dict(value)
+            whole = not same_law or _is_limit_state(value)
+            merged[key] = dict(value) if whole else overlay(below, value)
         else:
             merged[key] = value
     return merged
+
+
+def _is_limit_state(value: Mapping[str, Any]) -> bool:
+    """Whether keys and values say all of a limit state."""
+    return {"response", "limit"} <= set(value) or bool({"any_of", "all_of"} & set(value))
 
 
 def _file_keys(model: type[Parameters], path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -105,6 +112,15 @@ def _file_keys(model: type[Parameters], path: tuple[str, ...] = ()) -> Iterator[
             yield (*path, name)
 
 
+def _files_of_laws(mapping: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    """Yield the path of every key of a random quantity that can name a file."""
+    cases = mapping.get("cases")
+    for name, case in cases.items() if isinstance(cases, Mapping) else ():
+        random = case.get("random") if isinstance(case, Mapping) else None
+        for key in random if isinstance(random, Mapping) else ():
+            yield ("cases", name, "random", key, "file")
+
+
 def named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield the path of every key of the mapping that names a file, and the name.
 
@@ -113,7 +129,7 @@ def named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], s
     >>> list(named_files({"irregularity": {"profile_file": "track.csv"}}))
     [(('irregularity', 'profile_file'), 'track.csv')]
     """
-    for path in _file_keys(Config):
+    for path in (*_file_keys(Config), *_files_of_laws(mapping)):
         value: Any = mapping
         for part in path:
             value = value.get(part) if isinstance(value, Mapping) else None

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -28,7 +30,6 @@ from maglev.vocabulary import (
     GAINS,
     GROUPS,
     LIMIT_STATUS,
-    METHODS,
     PAPER_RESPONSES,
     RESPONSE_TABLE,
     RESPONSE_UNITS,
@@ -53,8 +54,15 @@ AXES = "x along travel from the first pier, y to the right, z down; SI units"
 OF_RESPONSE = "of the response"
 """Stands for the unit of each response along ``response``, see `RESPONSE_UNITS`."""
 
+TEXT = "str"
+"""Type of a variable that is text: names along a dimension, and other words."""
+
 PER_RESPONSE = "one over that of the response"
 """As `OF_RESPONSE`, for a density."""
+
+
+OF_PARAMETER = "of the parameter"
+"""Stands for the SI unit of each random quantity along ``parameter``, which the file names."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,12 +74,12 @@ class Variable:
     dims
         Names of its dimensions, in order.
     units
-        Unit in the notation of UDUNITS; ``"1"`` for a pure number; `OF_RESPONSE` or
+        Unit in the notation of UDUNITS; ``"1"`` for a pure number and for text; `OF_RESPONSE` or
         `PER_RESPONSE` for a variable along ``response``, whose rows have each their own unit.
     long_name
         Meaning, in the words of an axis label.
     dtype
-        Type in the file.
+        Type in the file; `TEXT` for words.
     flags
         Meaning of each integer value, for a variable that is a code; empty for a number.
     """
@@ -83,13 +91,21 @@ class Variable:
     flags: Mapping[int, str] | None = None
 
     @property
-    def attributes(self) -> dict[str, Any]:
-        """Attributes of the variable in a file."""
-        if self.units in (OF_RESPONSE, PER_RESPONSE):
-            units = [RESPONSE_UNITS[name] for name in PAPER_RESPONSES]
+    def rows(self) -> str | None:
+        """Dimension along which each row has a unit of its own; None if all have the same."""
+        if self.units not in (OF_RESPONSE, PER_RESPONSE):
+            return None
+        return "response" if "response" in self.dims else "limit_state"
+
+    def attributes(self, units_of_rows: Mapping[str, Sequence[str]] = MappingProxyType({})) -> dict:
+        """Attributes of the variable in a file whose rows have these units by dimension."""
+        if self.rows is not None:
+            units = list(units_of_rows.get(self.rows, ()))
             if self.units == PER_RESPONSE:
-                units = [{"m": "m-1", "m s-2": "m-1 s2", "1": "1"}[unit] for unit in units]
-            return {"long_name": self.long_name, "units_by_response": ", ".join(units)}
+                units = [_inverse(unit) for unit in units]
+            return {"long_name": self.long_name, f"units_by_{self.rows}": ", ".join(units)}
+        if self.dtype == TEXT or self.units == OF_PARAMETER:
+            return {"long_name": self.long_name}
         if self.flags is None:
             return {"units": self.units, "long_name": self.long_name}
         return {
@@ -99,9 +115,21 @@ class Variable:
         }
 
 
+def _inverse(unit: str) -> str:
+    """One over a unit in the notation of UDUNITS, such as ``m-1 s2`` for ``m s-2``."""
+    parts = [re.fullmatch(r"([A-Za-z]+)(-?\d+)?", word) for word in unit.split() if word != "1"]
+    powers = [(part[1], -int(part[2] or 1)) for part in parts if part is not None]
+    return " ".join(f"{name}{power if power != 1 else ''}" for name, power in powers) or "1"
+
+
 def _number(dims: str, units: str, long_name: str, dtype: str = "float64") -> Variable:
     """A variable on the named dimensions, given as words in one text."""
     return Variable(dims=tuple(dims.split()), units=units, long_name=long_name, dtype=dtype)
+
+
+def _words(dims: str, long_name: str) -> Variable:
+    """A variable that is text on the named dimensions."""
+    return Variable(dims=tuple(dims.split()), units="1", long_name=long_name, dtype=TEXT)
 
 
 def _code(dims: str, long_name: str, meanings: tuple[str, ...] | Mapping[int, str]) -> Variable:
@@ -278,9 +306,11 @@ def _study_table() -> dict[str, Variable]:
     step_level = "method step response failure_probability"
     return {
         # coordinates
-        "response": _code("response", "response", RESPONSES),
-        "parameter": _code("parameter", "random gain", GAINS),
-        "method": _code("method", "method of choosing the runs", METHODS),
+        "response": _words("response", "response whose extreme is meant"),
+        "parameter": _words("parameter", "key of the configuration that is random"),
+        "method": _words("method", "method by which the runs were chosen"),
+        "case": _words("case", "case of the configuration"),
+        "limit_state": _words("limit_state", "limit state that a passage can exceed"),
         "failure_probability": _number(
             "failure_probability", "1", "probability that the limit is exceeded"
         ),
@@ -290,8 +320,9 @@ def _study_table() -> dict[str, Variable]:
         "check": _number("check", "1", "number of the check", "int32"),
         # points and runs
         "standard": _number(
-            "sample parameter", "1", "gain less its mean, over its standard deviation"
+            "sample parameter", "1", "random quantity in standard form: normal, mean 0, deviation 1"
         ),
+        "parameter_value": _number("sample parameter", OF_PARAMETER, "random quantity in SI"),
         "probability": _number("sample", "1", "probability that the sample represents"),
         "discrepancy": _number("", "1", "GF-discrepancy of the points"),
         "counting_error": _number(
@@ -331,7 +362,9 @@ def _study_table() -> dict[str, Variable]:
             "response", "1", "root mean square leave-one-out error over the standard deviation"
         ),
         "length": _number(
-            "response parameter", "1", "length of the surrogate in standard deviations of the gain"
+            "response parameter",
+            "1",
+            "length of the surrogate in standard deviations of the parameter",
         ),
         **_with_ends("lost_probability", _number("", "1", "probability that levitation is lost")),
         **_with_ends("sobol_first", _number("response parameter", "1", "first-order Sobol' index")),
@@ -400,6 +433,12 @@ def _study_table() -> dict[str, Variable]:
         "held_limit_status": _code(
             level, "status of the limit given that levitation holds", LIMIT_STATUS
         ),
+        # limit states
+        "definition": _words("limit_state", "what the limit state says"),
+        "origin": _words("limit_state", "source and confidence of limit and target"),
+        "state_response": _words("limit_state", "response that it limits, none for several"),
+        "threshold": _number("limit_state", OF_RESPONSE, "value that must not be exceeded"),
+        "target": _number("limit_state", "1", "probability that the limit state may have"),
         "sigma": _number("response", OF_RESPONSE, "standard deviation by which errors are divided"),
         # accuracy
         "step_n_runs": _number(
@@ -680,6 +719,14 @@ def _study_table() -> dict[str, Variable]:
             "curve_lost_probability",
             _number("curve", "1", "probability that levitation is lost"),
         ),
+        **_with_ends(
+            "curve_state_probability",
+            _number(
+                "curve limit_state",
+                "1",
+                "probability that the limit state is exceeded or levitation lost",
+            ),
+        ),
         "curve_n_runs": _number("curve", "1", "number of runs of the model", "int32"),
         "curve_n_lost": _number("curve", "1", "number of runs that lost levitation", "int32"),
         "curve_variation": _number("curve", "1", "coefficient of variation of the gains"),
@@ -756,9 +803,9 @@ def _study_table() -> dict[str, Variable]:
                 "held_limit_against_baseline",
             ),
         ),
-        "check_case": _number("check", "1", "checked case, see flag_meanings", "int32"),
-        "check_method": _code("check", "checked method", METHODS),
-        "check_response": _code("check", "checked response", (*PAPER_RESPONSES, "none")),
+        "check_case": _words("check", "case that is checked"),
+        "check_method": _words("check", "method that is checked"),
+        "check_response": _words("check", "response that is checked, none for the loss"),
         "check_failure_probability": _number(
             "check", "1", "failure probability of the limit, 0 where there is none"
         ),
@@ -780,11 +827,19 @@ VARIABLES: Mapping[str, Variable] = _model_table() | _study_table()
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """One kind of file: its title, its required and its optional variables."""
+    """One kind of file: its title, its required and its optional variables.
+
+    Variables in ``own`` have here another meaning or other dimensions than in `VARIABLES`.
+    """
 
     title: str
     variables: tuple[str, ...]
     optional: tuple[str, ...] = ()
+    own: Mapping[str, Variable] = field(default_factory=dict)
+
+    def variable(self, name: str) -> Variable:
+        """What a variable of this file is."""
+        return self.own[name] if name in self.own else VARIABLES[name]
 
 
 _EXTREMES = (
@@ -811,7 +866,7 @@ _HISTORIES = (
     "magnet_side",
     "magnet_x",
 )
-_RUNS = (*_EXTREMES, "standard", "probability")
+_RUNS = (*_EXTREMES, "standard", "parameter_value", "probability")
 _ROUNDS = (
     "predicted",
     "score",
@@ -829,11 +884,27 @@ def _ends(*names: str) -> tuple[str, ...]:
     return tuple(f"{name}{end}" for name in names for end in ("", "_low", "_high"))
 
 
+def _of_states(dims: str) -> dict[str, Variable]:
+    """Probabilities of limit states, with their intervals, on the named dimensions."""
+    held = "probability that the limit state is exceeded given that levitation holds"
+    return {
+        **_with_ends(
+            "probability",
+            _number(dims, "1", "probability that the limit state is exceeded or levitation lost"),
+        ),
+        **_with_ends("held_probability", _number(dims, "1", held)),
+        **_with_ends("beta", _number(dims, "1", "reliability index of the probability")),
+    }
+
+
+_STATES = ("definition", "origin", "state_response", "threshold", "target")
+
+
 LAYOUTS: Mapping[str, Layout] = {
     "passage": Layout(
         title="Passage of the train over the guideway",
         variables=_EXTREMES,
-        optional=(*_HISTORIES, "track_seed"),
+        optional=(*_HISTORIES, "track_seed", "parameter_value"),
     ),
     "irregularity": Layout(
         title="Track irregularity and its spectra",
@@ -900,7 +971,14 @@ LAYOUTS: Mapping[str, Layout] = {
     ),
     "points": Layout(
         title="Points of the random gains",
-        variables=(*GAINS, "standard", "probability", "discrepancy", "counting_error"),
+        variables=(
+            *GAINS,
+            "standard",
+            "parameter_value",
+            "probability",
+            "discrepancy",
+            "counting_error",
+        ),
     ),
     "runs": Layout(
         title="Extremes of the runs of a case",
@@ -965,6 +1043,29 @@ LAYOUTS: Mapping[str, Layout] = {
             "n_runs",
             "sigma",
         ),
+    ),
+    "limit_states": Layout(
+        title="Probabilities of the limit states of a passage",
+        variables=(
+            *_STATES,
+            *_ends("probability", "held_probability", "beta"),
+            "n_runs",
+        ),
+        own=_of_states("limit_state"),
+    ),
+    "limit_state_table": Layout(
+        title="Probabilities of the limit states by every case and method",
+        variables=(
+            *_STATES,
+            *_ends("probability", "held_probability", "beta"),
+            "n_runs",
+        ),
+        own=_of_states("case method limit_state")
+        | {
+            "n_runs": _number(
+                "case method", "1", "number of runs of the model, 0 where there is none", "int32"
+            )
+        },
     ),
     "accuracy": Layout(
         title="Accuracy of limits against number of runs",
@@ -1098,6 +1199,23 @@ LAYOUTS: Mapping[str, Layout] = {
 """Variables of each kind of file, by its name."""
 
 
+def _known(name: str) -> Iterator[Variable]:
+    """Every meaning of a name in any file."""
+    if name in VARIABLES:
+        yield VARIABLES[name]
+    yield from (layout.own[name] for layout in LAYOUTS.values() if name in layout.own)
+
+
+def _units_of_rows(dataset: xr.Dataset) -> dict[str, list[str]]:
+    """Unit of each response and of each limit state of a dataset, by dimension."""
+    names = {"response": "response", "limit_state": "state_response"}
+    return {
+        dim: [str(RESPONSE_UNITS.get(str(one), "1")) for one in dataset[name].to_numpy()]
+        for dim, name in names.items()
+        if name in dataset.variables
+    }
+
+
 def describe(dataset: xr.Dataset) -> xr.Dataset:
     """Give every variable its unit and meaning from `VARIABLES`; arrays are not copied.
 
@@ -1113,15 +1231,17 @@ def describe(dataset: xr.Dataset) -> xr.Dataset:
     'kg m-1'
     """
     described = dataset.copy(deep=False)
+    units = _units_of_rows(dataset)
     for name in described.variables:
-        variable = VARIABLES.get(str(name))
-        if variable is None:
+        known = list(_known(str(name)))
+        if not known:
             raise ValueError(f"'{name}' is no variable of any file, see maglev.datasets.VARIABLES")
-        if described[name].dims != variable.dims:
+        fitting = [one for one in known if one.dims == described[name].dims]
+        if not fitting:
             raise ValueError(
-                f"'{name}' must stand on {variable.dims}, got {tuple(described[name].dims)}"
+                f"'{name}' must stand on {known[0].dims}, got {tuple(described[name].dims)}"
             )
-        described[name].attrs = {**described[name].attrs, **variable.attributes}
+        described[name].attrs = {**described[name].attrs, **fitting[0].attributes(units)}
     return described
 
 
@@ -1159,16 +1279,20 @@ def _mistake(dataset: xr.Dataset, layout: str) -> str | None:
     for name in known.variables:
         if name not in dataset.variables:
             return f"{layout}: '{name}' is missing"
+    for name in map(str, dataset.dims):
+        text = any(one.dtype == TEXT for one in _known(name))
+        if text and not (name in dataset.variables and dataset[name].dtype.kind in "UO"):
+            return f"{layout}: '{name}' must name its places in words"
     for name in map(str, dataset.variables):
         if name in dataset.dims:
             continue
         if name not in (*known.variables, *known.optional):
             return f"{layout}: '{name}' does not belong here"
-        expected, found = VARIABLES[name], dataset[name]
+        expected, found = known.variable(name), dataset[name]
         if tuple(found.dims) != expected.dims:
             return f"{layout}: '{name}' must stand on {expected.dims}, got {tuple(found.dims)}"
         units = found.attrs.get("units")
-        if "units" in expected.attributes and units != expected.units:
+        if "units" in expected.attributes() and units != expected.units:
             return f"{layout}: '{name}' must be in '{expected.units}', got '{units}'"
     return None
 
@@ -1279,7 +1403,11 @@ def write_netcdf(dataset: xr.Dataset, path: str | Path) -> None:
     ordered.attrs = dict(sorted(dataset.attrs.items()))
     encoding: dict[str, dict[str, Any]] = {}
     for name in map(str, ordered.variables):
-        dtype = VARIABLES[name].dtype
+        dtype = next(one.dtype for one in _known(name) if one.dims == ordered[name].dims)
+        if dtype == TEXT:
+            encoding[name] = {"dtype": str}
+            ordered[name].encoding = {}
+            continue
         encoding[name] = {"dtype": dtype, "_FillValue": None}
         if ordered[name].ndim:
             encoding[name] |= {"zlib": True, "complevel": 4, "shuffle": True}

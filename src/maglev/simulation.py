@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from maglev import datasets, profiles
-from maglev.arrays import FloatArray
+from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile, profile
-from maglev.mechanics.responses import GIRDER_RESPONSES, Passages, checked_gains, responses
+from maglev.mechanics.responses import (
+    GIRDER_RESPONSES,
+    Passages,
+    checked_gains,
+    in_their_order,
+    responses,
+)
+from maglev.mechanics.varied import checked_values, cost_of, equal_samples
 from maglev.parameters import Config
 
 KEPT_TRACKS = 64
@@ -36,11 +46,14 @@ def simulate(
     histories: bool = False,
     solver: Literal["production", "reference"] = "production",
     *,
+    values: Mapping[str, npt.ArrayLike] | None = None,
     track_seeds: npt.ArrayLike | None = None,
     n_threads: int = 1,
     on_progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Take the train over the guideway once for every row of gains.
+
+    A sample's numbers do not depend on its neighbours, on their number or on ``n_threads``.
 
     Parameters
     ----------
@@ -54,6 +67,9 @@ def simulate(
     solver
         ``"production"``: compiled, many samples at once; ``"reference"``: full finite elements with
         a step of its own, halved until the extremes are right to 0.1 %, some thousand times slower.
+    values : key of (sample,)
+        Numbers in SI of each sample in place of those of the configuration, by dotted keys such as
+        ``"train.car_body.mass"``; `cost_of` says what they cost.
     track_seeds : (sample,)
         Seed of each sample's irregularity; ``config.seed`` for all if not given.
     n_threads
@@ -70,17 +86,19 @@ def simulate(
         currents [A], ``status`` and where and when levitation was lost; with ``histories`` also the
         time series on ``t``.  The responses of a lost sample are NaN, as are those of a sample
         whose gains ask for a smaller step, which is not judged (status ``step_too_large``).
-        Attributes ``time_step`` [s], ``n_steps`` and ``track``, the words for the track that the
-        numbers are of; of the reference solver also ``estimated_error``, the largest of the six
-        responses of the paper as a share of it, and ``seconds``.
+        Attributes ``time_step`` [s], ``n_steps``, both the largest of any sample, and ``track``,
+        the words for the track that the numbers are of; of the reference solver also
+        ``estimated_error``, the largest of the six responses of the paper as a share of it, and
+        ``seconds``.
 
     Raises
     ------
     UserError
         If the gains have another shape or are not finite, the time step exceeds the stability
-        limit, the irregularity does not cover the passage, the solver is unknown, or the seeds are
-        not whole numbers from zero, one for each sample of the production solver, or the reference
-        solver does not reach its accuracy.
+        limit, the irregularity does not cover the passage, the solver is unknown, the seeds are
+        not whole numbers from zero, one for each sample of the production solver, a value is of no
+        number of the configuration, or will not do for it, or the reference solver does not reach
+        its accuracy.
     FileNotFoundError
         If the irregularity's file does not exist.
 
@@ -105,29 +123,101 @@ def simulate(
     if solver not in ("production", "reference"):
         raise UserError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
-    every = (
-        max(1, int(HISTORY_INTERVAL / course(config).time_step * (1 + 1e-9))) if histories else 0
-    )
-    if solver == "production":
-        passages = integrate.integrate(
-            _system(config, _track_file_hash(config)),
-            gains,
-            profile_of=None if seeds is None else _tracks_of(config, seeds),
-            record_every=every,
-            n_threads=n_threads,
-            on_progress=on_progress,
+    given = checked_values(config, values or {}, gains.shape[0])
+    groups = _groups(config, given, gains.shape[0], solver)
+    _refuse_unequal_histories(groups, histories)
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(n_threads) as pool:
+        found = list(
+            pool.map(
+                lambda group: _run(
+                    group,
+                    gains,
+                    given,
+                    histories,
+                    solver,
+                    seeds,
+                    n_threads if len(groups) == 1 else 1,
+                    on_progress,
+                ),
+                groups,
+            )
         )
-    else:
+    passages = in_their_order([one for one, _ in found], [group.rows for group in groups])
+    whole = _dataset(groups, gains, passages, histories)
+    whole.attrs["track"] = track_words(config, seeds)
+    if solver == "reference":
+        worst = max((effort for _, effort in found), key=lambda effort: effort["estimated_error"])
+        whole.attrs |= worst | {"seconds": sum(effort["seconds"] for _, effort in found)}
+    return datasets.describe(whole)
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Samples that share a system: their numbers, its configuration, what else each has its own."""
+
+    rows: IntArray
+    config: Config
+    own: tuple[str, ...]
+
+
+def _groups(
+    config: Config, values: Mapping[str, FloatArray], n_samples: int, solver: str
+) -> list[_Group]:
+    """Samples in groups of equal values of what is built anew; all of it for the reference."""
+    cost = cost_of(config, values)
+    built = [key for key in values if cost[key] == "rebuild" or solver == "reference"]
+    built = list(values)
+    own = tuple(key for key in values if key not in built)
+    found = []
+    for rows in equal_samples([values[key] for key in built], n_samples):
+        numbers = {key: float(values[key][rows[0]]) for key in built}
+        place = f"sample {rows[0]}: " if built else ""
+        found.append(_Group(rows, config.with_numbers(numbers, place) if built else config, own))
+    return found
+
+
+def _refuse_unequal_histories(groups: Sequence[_Group], histories: bool) -> None:
+    """Refuse histories of samples whose steps or magnets are not the same."""
+    ways = {(course(one.config).time_step, course(one.config).n_steps) for one in groups}
+    trains = {one.config.train.n_cars for one in groups}
+    if histories and (len(ways) > 1 or len(trains) > 1):
+        raise UserError(
+            "histories need the same times and magnets for all samples, but the values change the "
+            "run's length, its step or the number of cars; ask for these samples one by one"
+        )
+
+
+def _run(
+    group: _Group,
+    gains: FloatArray,
+    values: Mapping[str, FloatArray],
+    histories: bool,
+    solver: str,
+    seeds: list[int] | None,
+    n_threads: int,
+    on_progress: Callable[[int], None] | None,
+) -> tuple[Passages, dict[str, Any]]:
+    """Passages of a group, and what the reference solver says of its effort."""
+    config, rows = group.config, group.rows
+    if solver == "reference":
         from maglev.mechanics import reference  # seldom needed
 
+        interval = HISTORY_INTERVAL if histories else None
         passages, effort = reference.solve(
-            config, track(config), gains, record_interval=HISTORY_INTERVAL if histories else None
+            config, track(config), gains[rows], record_interval=interval
         )
-    found = _dataset(config, gains, passages, histories)
-    found.attrs["track"] = track_words(config, seeds)
-    if solver == "reference":
-        found.attrs |= effort.attributes
-    return datasets.describe(found)
+        return passages, effort.attributes
+    step = course(config).time_step
+    every = max(1, int(HISTORY_INTERVAL / step * (1 + 1e-9))) if histories else 0
+    passages = integrate.integrate(
+        _system(config, _track_file_hash(config)),
+        gains[rows],
+        profile_of=None if seeds is None else _tracks_of(config, [seeds[k] for k in rows]),
+        record_every=every,
+        n_threads=n_threads,
+        on_progress=on_progress,
+    )
+    return passages, {}
 
 
 def track(config: Config, seed: int | None = None) -> Profile:
@@ -219,12 +309,15 @@ def _system(config: Config, _track_file: str) -> integrate.System:
     return integrate.prepare(config, track(config))
 
 
-def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: bool) -> xr.Dataset:
-    one, way = ("sample",), course(config)
+def _dataset(
+    groups: Sequence[_Group], gains: FloatArray, passages: Passages, histories: bool
+) -> xr.Dataset:
+    one, config = ("sample",), groups[0].config
+    ways = [course(group.config) for group in groups]
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)
     }
-    for name, found in responses(passages, config).items():
+    for name, found in responses(passages).items():
         for part, values in found.parts.items():
             variables[f"{name}{part}"] = (one if values.ndim == 1 else ("sample", "car"), values)
     for k, kind in enumerate(("suspension", "guidance")):
@@ -236,7 +329,7 @@ def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: b
     variables["lost_magnet"] = (one, passages.lost_magnet)
     coordinates: dict[str, npt.NDArray] = {
         "sample": np.arange(gains.shape[0]),
-        "car": np.arange(config.train.n_cars),
+        "car": np.arange(passages.body_z.shape[1]),
     }
     if histories:
         for k, name in enumerate(GIRDER_RESPONSES):
@@ -255,5 +348,8 @@ def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: b
     return xr.Dataset(
         variables,
         coords=coordinates,
-        attrs={"time_step": way.time_step, "n_steps": way.n_steps},
+        attrs={
+            "time_step": max(way.time_step for way in ways),
+            "n_steps": max(way.n_steps for way in ways),
+        },
     )

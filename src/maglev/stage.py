@@ -21,10 +21,11 @@ from maglev.config import named_files
 from maglev.errors import UserError
 from maglev.fingerprint import code_of, file_hash
 from maglev.parameters import Config, Parameters
-from maglev.vocabulary import BASELINE, METHODS, Method
+from maglev.vocabulary import BASELINE, METHODS, Method, Response
 
 if TYPE_CHECKING:
     import xarray as xr
+    from pydantic.fields import FieldInfo
 
 _FOLDER = Path(__file__).parent / "stages"
 
@@ -155,19 +156,22 @@ class Stage:
         -------
         part
             Of a stage that reads its case: without the other cases, the case's own values in their
-            sections and the guideway with its spans; its methods are the one method.
+            sections and the guideway with its spans; its methods are the one method.  Of a stage
+            that reads responses of the study: those of the limit states among them.
         """
         keys = self.keys(case, method)
         if case is not None and self.reads_of != "run":
             config = config.with_case_set(case)
-        whole = config.quantities()
+        whole = config.with_responses().quantities()
         part = _chosen(whole, keys)
+        if "study" in part and "limit_states" not in part:  # their responses are in the study
+            part["limit_states"] = dict.fromkeys(Config.model_fields["limit_states"].default)
         if self.reads_of != "run":
             assert case is not None  # keys has asked for it
             own = {"methods": [method or BASELINE], **part.get("cases", {}).get(case, {})}
             part["cases"] = {**dict.fromkeys(whole["cases"]), case: own}
             if "guideway" in part:
-                n_spans = whole["cases"][case]["n_spans"]
+                n_spans = whole["cases"][case]["n_spans"] or whole["guideway"]["n_spans"]
                 part["guideway"] = {**part["guideway"], "n_spans": n_spans}
         return part
 
@@ -192,6 +196,7 @@ class Stage:
             raise UserError(f"there is no case '{case}', known are: {', '.join(config.cases)}")
         if case is not None and self.reads_of != "run":
             config = config.with_case_set(case)
+        config = config.with_responses()
         hashes = {name: file_hash(path) for name, path in self.files(config, case, method).items()}
         keys = self.keys(case, method)
         return cast(Config, View(self.name, config, keys, files=tuple(sorted(hashes.items()))))
@@ -310,6 +315,17 @@ class View:
     def __contains__(self, name: object) -> bool:
         return name in set(self)
 
+    def field_named(self, name: str) -> FieldInfo:
+        """Field of the section by its name.
+
+        Raises
+        ------
+        KeyError
+            If it has none of that name.
+        """
+        assert isinstance(self._section, Parameters)
+        return self._section.field_named(name)
+
     def model_copy(self, *, update: Mapping[str, Any]) -> View:
         """The same view of a section with other values of some keys, which it must have read."""
         for name in update:
@@ -321,6 +337,22 @@ class View:
     def with_case_set(self, _name: str) -> View:
         """The view itself, in whose sections a case's own values already are."""
         return self
+
+    def with_responses(self) -> View:
+        """The view itself: its study has named all responses since it was made."""
+        return self
+
+    @property
+    def responses_of_study(self) -> tuple[Response, ...]:
+        """Responses that are predicted, as the study of the view names them."""
+        found: tuple[Response, ...] = self.study.responses
+        return found
+
+    @property
+    def responses_of_designs(self) -> tuple[Response, ...]:
+        """Responses that drive adaptive designs, likewise."""
+        found: tuple[Response, ...] = self.study.asm.responses
+        return found
 
     def quantities(self) -> dict[str, Any]:
         """Readable values in the form of a configuration file, units included."""

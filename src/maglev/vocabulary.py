@@ -26,7 +26,7 @@ _GIRDER = "of the girder at midspan of the middle span"
 _CAR = "of the car body, largest over the cars"
 _END = "at the ends of the car body's floor, largest over the cars"
 _POLE = "from its reference, of any pole"
-_SHARE = "as a share of the chopper's largest"
+_SHARE = "as a share of the largest that the chopper gives"
 RESPONSE_TABLE: Mapping[str, ResponseEntry] = {
     "girder_displacement_z": ResponseEntry(
         "m", f"largest absolute vertical displacement {_GIRDER}", "girder"
@@ -101,17 +101,16 @@ RESPONSE_TABLE: Mapping[str, ResponseEntry] = {
 """Every response that a passage is judged by: its unit and its meaning, in the order of files."""
 
 RESPONSES: tuple[str, ...] = tuple(RESPONSE_TABLE)
-"""All responses in the order of ``response`` in files and arrays."""
+"""All responses in the order in which they are shown."""
 
 PAPER_RESPONSES: tuple[str, ...] = RESPONSES[:6]
 """The responses of the paper: midspan and car bodies."""
 
 if TYPE_CHECKING:
     Response: TypeAlias = str
-    PaperResponse: TypeAlias = str
 else:
     Response = Literal[RESPONSES]
-    PaperResponse = Literal[PAPER_RESPONSES]
+"""A response of a passage: a name in `RESPONSE_TABLE`."""
 
 TIMED_RESPONSES: tuple[Response, ...] = tuple(
     name for name, entry in RESPONSE_TABLE.items() if entry.timed
@@ -221,6 +220,9 @@ fine a mesh; direct, where there is no GDEE or it refused both."""
 
 SOURCES = ("paper", "ours")
 """Source of a number."""
+
+LOST = "lost"
+"""The limit state that is always there: levitation is lost."""
 
 TRACK_PARTS = ("gains_only", "track_only", "other_track", "other_gains")
 """Further runs of a case whose baseline has gains i on track i: gains i on the configured track;

@@ -1,6 +1,7 @@
 """Figures of the study draw from small files, show what those hold, and refuse what is missing."""
 
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -16,12 +17,14 @@ from maglev.figures import (
     curves,
     density_by_control,
     draw,
+    exceedance,
     labels,
     layouts_of,
     limits_by_control,
     stability,
     style,
 )
+from maglev.vocabulary import PAPER_RESPONSES
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +43,60 @@ def test_a_figure_of_the_study_is_drawn_with_its_numbers(tmp_path, files, name):
         for variable in plotted.variables:
             assert "long_name" in plotted[variable].attrs, variable
         assert plotted.attrs["demonstration"] == "no"
+
+
+OF_RESPONSES = [
+    "training", "prediction", "density_by_method", "exceedance_by_method", "exceedance",
+    "density_by_gain", "limits_by_gain", "limits_by_variation", "sobol", "accuracy",
+    "track_split", "tracks", "track_limits",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OF_RESPONSES)
+def test_a_figure_shows_whichever_responses_there_are(files, name):
+    few = [PAPER_RESPONSES[4], PAPER_RESPONSES[1]]
+    layouts = layouts_of(name, len(files[name]))
+    paths, arguments = iter(files[name]), []
+    for entry, group in zip(FIGURES[name], layouts, strict=True):
+        found = [datasets.read(next(paths), layout) for layout in group]
+        found = [one.sel(response=few) if "response" in one.dims else one for one in found]
+        arguments.append(found if entry.endswith("*") else found[0])
+    fig, plotted = import_module(f"maglev.figures.{name}").figure(*arguments)
+    assert plotted["response"].to_numpy().tolist() == few
+    titles = [axis.get_title(loc="left") or axis.get_title() for axis in fig.axes]
+    words = " ".join(titles).replace("\n", " ")
+    assert labels.shown(few[0]).name in words
+    assert labels.shown(PAPER_RESPONSES[0]).name not in words
+
+
+def test_any_number_of_responses_has_panels_in_rows_of_three():
+    names = [*PAPER_RESPONSES, *PAPER_RESPONSES[:2]]
+    data = xr.Dataset(coords={"response": names})
+    fig, panels = labels.response_panels(data, 4.0)
+    assert [number for number, _, _ in panels] == list(range(8))
+    assert len(fig.axes) == 8
+    assert panels[7][1].get_title(loc="left").startswith("(h) ")
+    assert fig.get_figheight() > 4.0
+    assert [labels.lowest(number, data) for number in range(8)] == [False] * 5 + [True] * 3
+
+
+def test_limits_stand_on_the_exceedance_with_their_probability(tmp_path, files):
+    draw("exceedance", files["exceedance"], tmp_path / "f")
+    n = len(files["exceedance"]) // 2
+    with xr.open_dataset(tmp_path / "f.nc") as plotted:
+        for number, path in enumerate(files["exceedance"][n:]):
+            one = datasets.read(path, "limit_states")
+            assert_allclose(plotted["curve_state_probability"][number], one["probability"])
+        assert plotted["threshold"].attrs["units_by_limit_state"] == "1, m s-2, m s-2, m s-2, 1"
+    densities = read(files["exceedance"][:n], "density")
+    states = read(files["exceedance"][n:], "limit_states")
+    fig, _ = exceedance.figure(densities, states)
+    words = [[text.get_text() for text in axis.texts] for axis in fig.axes]
+    assert words[2][0] == "low, 0.55 m/s²" and words[2][1] == "MCM P = 16 [12.8, 19.2] %"
+    assert words[4][0] == "far, 5 m/s² (right of the panel)"
+    assert words[0] == words[1] == words[5] == []
+    with pytest.raises(ValueError, match="must be of the same methods"):
+        exceedance.figure(densities, states[::-1])
 
 
 def test_the_same_figure_is_the_same_bytes(tmp_path, files):

@@ -28,8 +28,7 @@ def test_every_sharing_of_circuits_and_a_lag_have_a_case():
 def test_the_first_check_of_a_case_knows_that_circuits_on_a_mean_gap_need_more():
     config = Config()
     plain, half = (
-        config.of_case(name).statically_stable(config.cases[name])
-        for name in ("validation", "group_half")
+        config.of_case(name).statically_stable(name) for name in ("validation", "group_half")
     )
     assert plain > 0.99
     expected = norm.cdf((3500 - 3115) / 350) * norm.cdf((4500 - 3490) / 450)

@@ -19,6 +19,7 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "prediction": ("prediction",),
     "density_by_method": ("density*",),
     "exceedance_by_method": ("density*",),
+    "exceedance": ("density*", "limit_states*"),
     "density_by_gain": ("density*", "design*"),
     "limits_by_gain": ("limits*", "design*"),
     "density_by_variation": ("density*", "design*"),

@@ -13,7 +13,7 @@ from maglev.datasets import VARIABLES
 from maglev.errors import UserError
 from maglev.figures import labels, style
 from maglev.figures.style import Look
-from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, PAPER_RESPONSES
+from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS
 
 _ENDS = ("", "_low", "_high")
 _INFINITE = LIMIT_STATUS.index(INFINITE)
@@ -85,13 +85,15 @@ def limits(data: Sequence[xr.Dataset]) -> xr.Dataset:
 def _gathered(
     data: Sequence[xr.Dataset], columns: dict[str, list[FloatArray]], last: tuple[str, ...]
 ) -> xr.Dataset:
+    for one in data[1:]:
+        if not np.array_equal(one["response"], data[0]["response"]):
+            raise UserError("all files must be of the same responses; compute them again")
     dims = ("curve", "response", *last)
     variables = {}
     for name, values in columns.items():
         stacked = np.stack(values).astype(VARIABLES[f"curve_{name}"].dtype)
         variables[f"curve_{name}"] = (dims[: stacked.ndim], stacked)
-    response = np.arange(len(PAPER_RESPONSES), dtype=np.int8)
-    return xr.Dataset(variables, coords={"curve": named(data), "response": response})
+    return xr.Dataset(variables, coords={"curve": named(data), "response": data[0]["response"]})
 
 
 def body(curves: xr.Dataset, response: int, tail: float) -> tuple[float, float]:
@@ -127,7 +129,7 @@ def apart(curves: xr.Dataset, response: int) -> BoolArray:
 
 def note_apart(axis: Axes, curve: xr.Dataset, response: int, look: Look) -> None:
     """Write peak and range of a single curve that lies off the panel into its corner."""
-    shown = labels.SHOWN[response]
+    shown = labels.shown(str(curve["response"].values[response]))
     at = curve.isel(curve=0, response=response)
     peak = int(at["curve_density"].argmax("cell"))
     low, high = (shown.scale * end for end in body(curve, response, 5e-3))
@@ -166,7 +168,7 @@ def draw_densities(
     span
         First and last value shown [unit of the response], as from `body`.
     """
-    shown = labels.SHOWN[response]
+    shown = labels.shown(str(curves["response"].to_numpy()[response]))
     at = curves.isel(response=response)
     peaks = at["curve_density"].max("cell").to_numpy() / shown.scale
     top = 1.12 * peaks[peaks <= 5.0 * peaks.min()].max()
@@ -271,7 +273,8 @@ def limits_apart(at: xr.Dataset) -> BoolArray:
 def in_shown_unit(found: xr.Dataset, response: int) -> xr.Dataset:
     """Limits of a response in the unit in which it is shown."""
     names = [f"curve_{name}{end}" for name in ("limit", "held_limit") for end in _ENDS]
-    return labels.SHOWN[response].scale * found[names].isel(response=response)
+    scale = labels.shown(str(found["response"].to_numpy()[response])).scale
+    return scale * found[names].isel(response=response).drop_vars("response")
 
 
 def differ(found: xr.Dataset) -> bool:

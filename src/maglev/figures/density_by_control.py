@@ -1,4 +1,4 @@
-"""Densities of the six extremes for each sharing of circuits, and with lag."""
+"""Densities of the extremes for each sharing of circuits, and with lag."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def figure(
         name, look = labels.control_style(design)
         looks.append(look)
         words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
-    fig, panels = labels.response_panels(4.7)
+    fig, panels = labels.response_panels(found, 4.7)
     for response, axis, _ in panels:
         far = curves.apart(found, response)
         near = found.isel(curve=~far)

@@ -1,4 +1,4 @@
-"""Densities of the six extremes for growing coefficients of variation of the gains."""
+"""Densities of the extremes for growing coefficients of variation of the gains."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def figure(
             variations[order], found["curve_n_runs"], found["curve_lost_probability"], strict=True
         )
     ]
-    fig, panels = labels.response_panels(4.7)
+    fig, panels = labels.response_panels(found, 4.7)
     for response, axis, shown in panels:
         span = _span(found, response)
         curves.draw_densities(axis, found, response, looks, span)

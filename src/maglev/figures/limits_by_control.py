@@ -1,4 +1,4 @@
-"""Limits of the six extremes against failure probability for each sharing of circuits."""
+"""Limits of the extremes against failure probability for each sharing of circuits."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def figure(
         looks.append({**look, "marker": _MARKERS[number % len(_MARKERS)]})
         words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
         handles.append(Line2D([], [], **looks[-1], ms=3.5))
-    fig, panels = labels.response_panels(4.7)
+    fig, panels = labels.response_panels(found, 4.7)
     for response, axis, shown in panels:
         at = curves.in_shown_unit(found, response)
         far = curves.limits_apart(at)

@@ -1,4 +1,4 @@
-"""Dependence of the six extremes: pairs of responses of the baseline as densities of points."""
+"""Dependence of the paper's responses: pairs of extremes of the baseline as densities of points."""
 
 from __future__ import annotations
 
@@ -35,10 +35,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         The figure and the numbers in it.
     """
     held = data["status"].to_numpy() == 0
-    values = [
-        labels.SHOWN[k].scale * data[name].to_numpy()[held]
-        for k, name in enumerate(PAPER_RESPONSES)
-    ]
+    values = [labels.shown(name).scale * data[name].to_numpy()[held] for name in PAPER_RESPONSES]
     n, n_lost = held.size, int((~held).sum())
     spans = []
     for one in values:
@@ -78,9 +75,13 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         if column > 0:
             axis.set_yticklabels([])
         if row == size - 1:
-            axis.set_xlabel(f"{_SHORT[column]}\n[{labels.SHOWN[column].unit}]", fontsize=7)
+            axis.set_xlabel(
+                f"{_SHORT[column]}\n[{labels.shown(PAPER_RESPONSES[column]).unit}]", fontsize=7
+            )
         if column == 0:
-            axis.set_ylabel(f"{_SHORT[row]}\n[{labels.SHOWN[row].unit}]", fontsize=7)
+            axis.set_ylabel(
+                f"{_SHORT[row]}\n[{labels.shown(PAPER_RESPONSES[row]).unit}]", fontsize=7
+            )
     fig.align_labels()
     assert drawn is not None
     inset = fig.add_axes((0.66, 0.72, 0.25, 0.015))

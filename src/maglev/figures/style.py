@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from string import ascii_lowercase
 from typing import TypedDict
 
 import matplotlib as mpl
@@ -75,7 +76,7 @@ def panels(rows: int, columns: int, width: float, height: float) -> tuple[Figure
     """A figure of equal panels, lettered (a), (b) … from left to right; sizes in inches."""
     figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.07))
     axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
-    for letter, axis in zip("abcdefghijklmnop", axes, strict=False):
+    for letter, axis in zip(ascii_lowercase, axes, strict=False):
         axis.set_title(f"({letter})", loc="left")
     return figure, axes
 

@@ -156,13 +156,20 @@ def sperling_index(weighted_rms: npt.ArrayLike) -> FloatArray:
     --------
     >>> amplitude = 0.5 * sperling_weight(1.3, lateral=False)  # 0.5 m/s² at 1.3 Hz
     >>> round(float(sperling_index(amplitude / 2**0.5)), 2)
-    2.65
+    2.66
     """
     return 3.57 * (math.sqrt(2.0) * np.asarray(weighted_rms, dtype=float)) ** 0.3
 
 
 def window(config: Config, car: int) -> tuple[float, float]:
-    """Time from which a car's front is on the guideway, and until which its rear is [s]."""
+    """Time from which a car's front is on the guideway, and until which its rear is [s].
+
+    Examples
+    --------
+    >>> enters, leaves = window(Config(), 0)
+    >>> round((leaves - enters) * 430 / 3.6, 2)  # five spans and its own length
+    148.61
+    """
     way, pitch = course(config), config.train.car_pitch
     enters = (car * pitch - way.start) / way.speed
     leaves = ((car + 1) * pitch + config.guideway.length - way.start) / way.speed
@@ -190,7 +197,13 @@ class Readings:
 
 
 def readings(config: Config) -> Readings:
-    """Readings of the filters in the production solver."""
+    """Readings of the filters in the production solver.
+
+    Examples
+    --------
+    >>> readings(Config()).every  # steps of 0.54 ms
+    3
+    """
     way: Course = course(config)
     every = max(1, int(READING / way.time_step * (1 + 1e-9)))
     ends = np.array([window(config, car) for car in range(config.train.n_cars)]) / way.time_step
@@ -220,12 +233,12 @@ def weighted_rms(
 
     Examples
     --------
-    >>> config = Config.model_validate({"train": {"n_cars": 1}, "guideway": {"n_spans": 5}})
-    >>> time = 1e-3 * np.arange(1, 2300)
+    >>> config = Config.model_validate({"train": {"n_cars": 1}})
+    >>> time = 1e-3 * np.arange(1, 2500)
     >>> sine = np.sin(2 * np.pi * 8.0 * time)[:, None, None, None]
     >>> rms = weighted_rms(config, time, (sine, 0 * sine))
-    >>> round(float(rms[0, 2, 0]), 2)  # W_k of 8 Hz is 1.036
-    0.73
+    >>> bool(abs(rms[0, 2, 0] - 1.036 / 2**0.5) < 0.01)  # W_k of 8 Hz is 1.036
+    True
     """
     step = float(time[0])
     squares = []

@@ -32,7 +32,7 @@ from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.linear import Block
 from maglev.mechanics.reduction import ReducedGuideway, reduce
-from maglev.mechanics.responses import Passages, checked_gains
+from maglev.mechanics.responses import Passages, checked_gains, compared_with
 from maglev.mechanics.statics import largest_deflection
 from maglev.mechanics.step_limit import (
     guideway_limit,
@@ -307,7 +307,7 @@ def _gathered(
         weighted=weighted,
         lift=extreme[:, -1],
         lift_time=when[:, -1],
-        static_deflection=np.full(n_samples, system.static_deflection),
+        **compared_with(system.config, system.static_deflection, n_samples),
         gap_min=bounds[:, 0:2],
         gap_max=bounds[:, 2:4],
         current_max=bounds[:, 4:6],

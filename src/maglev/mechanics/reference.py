@@ -36,6 +36,7 @@ from maglev.mechanics.responses import (
     Passages,
     acceleration_filter,
     checked_gains,
+    compared_with,
 )
 from maglev.mechanics.statics import largest_deflection
 from maglev.parameters import Config
@@ -623,7 +624,7 @@ def passages_of(record: Record, config: Config, every: int) -> Passages:
         weighted=weighted,
         lift=lift,
         lift_time=lift_time,
-        static_deflection=np.full(status.size, largest_deflection(*models)),
+        **compared_with(config, largest_deflection(*models), status.size),
         body_z=body_z,
         body_y=body_y,
         body_z_time=body_z_time,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from functools import partial
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.mechanics.comfort import sperling_index
-from maglev.parameters import Config, Magnet, Passage
+from maglev.parameters import Config, Passage
 from maglev.vocabulary import RESPONSES, Response
 
 GIRDER_RESPONSES = (
@@ -43,8 +43,10 @@ class Passages:
         `maglev.mechanics.comfort.WEIGHTINGS` [m/s²]; likewise.
     lift, lift_time : (sample,)
         Largest lift off a bearing of the middle span [m] and when it occurred [s]; likewise.
-    static_deflection : (sample,)
-        Largest deflection of midspan under the train at rest [m].
+    gap_reference, current_limit : (sample, kind)
+        Gap at rest [m] and largest current of the chopper [A] of suspension and guidance.
+    span_length, static_deflection : (sample,)
+        Of the guideway [m], and the largest deflection of midspan under the train at rest [m].
     gap_min, gap_max, current_max : (sample, kind)
         Of suspension and guidance [m, m, A].
     status : (sample,)
@@ -79,6 +81,9 @@ class Passages:
     weighted: FloatArray
     lift: FloatArray
     lift_time: FloatArray
+    gap_reference: FloatArray
+    current_limit: FloatArray
+    span_length: FloatArray
     static_deflection: FloatArray
     gap_min: FloatArray
     gap_max: FloatArray
@@ -129,24 +134,61 @@ class Found:
         return {name: values for name, values in all_parts.items() if values is not None}
 
 
-def responses(passages: Passages, config: Config) -> dict[Response, Found]:
+def compared_with(
+    config: Config, static_deflection: float, n_samples: int
+) -> dict[str, FloatArray]:
+    """What responses of samples that share a configuration are compared with, for `Passages`.
+
+    Parameters
+    ----------
+    config
+        Their configuration.
+    static_deflection
+        Largest deflection of midspan under the train at rest [m].
+    n_samples
+        Number of samples.
+
+    Examples
+    --------
+    >>> compared_with(Config(), 1.6e-3, 1)["current_limit"].tolist()
+    [[120.0, 120.0]]
+    """
+    magnets = (config.train.suspension_magnet, config.train.guidance_magnet)
+    one = {
+        "gap_reference": [magnet.gap_reference for magnet in magnets],
+        "current_limit": [magnet.current_max for magnet in magnets],
+        "span_length": config.guideway.span_length,
+        "static_deflection": static_deflection,
+    }
+    return {name: np.array([value] * n_samples) for name, value in one.items()}
+
+
+def responses(passages: Passages) -> dict[Response, Found]:
     """All responses of a set of passages, in the order of `maglev.vocabulary.RESPONSES`.
 
     Parameters
     ----------
     passages
-        What was watched.
-    config
-        Its parameters: references of gaps and currents, the span.
+        What was watched, and what it is compared with.
 
     References
     ----------
     docs/theory/responses.md.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.integrate import integrate, prepare
+    >>> from maglev.simulation import track
+    >>> short = {"train": {"n_cars": 1}, "guideway": {"n_spans": 1}}
+    >>> config = Config.model_validate(short)
+    >>> passages = integrate(prepare(config, track(config)), np.array([config.gains.as_row]))
+    >>> bool(1.0 < responses(passages)["dynamic_coefficient"].value[0] < 1.2)
+    True
     """
-    return {name: _FOUND[name](passages, config) for name in RESPONSES}
+    return {name: _FOUND[name](passages) for name in RESPONSES}
 
 
-def _of_girder(place: int, passages: Passages, config: Config) -> Found:
+def _of_girder(place: int, passages: Passages) -> Found:
     return Found(
         passages.girder[:, place],
         passages.girder_time[:, place],
@@ -170,60 +212,91 @@ def _held(values: FloatArray, passages: Passages) -> FloatArray:
     return np.where(passages.status == 0, values, np.nan)
 
 
-def _gap_excursion(kind: int, passages: Passages, config: Config) -> Found:
-    reference = _magnets(config)[kind].gap_reference
+def _gap_excursion(kind: int, passages: Passages) -> Found:
+    reference = passages.gap_reference[:, kind]
     closer = reference - passages.gap_min[:, kind]
     return Found(_held(np.maximum(closer, passages.gap_max[:, kind] - reference), passages))
 
 
-def _current_share(kind: int, passages: Passages, config: Config) -> Found:
-    share = passages.current_max[:, kind] / _magnets(config)[kind].current_max
+def _current_share(kind: int, passages: Passages) -> Found:
+    share = passages.current_max[:, kind] / passages.current_limit[:, kind]
     return Found(_held(share, passages))
 
 
-def _magnets(config: Config) -> tuple[Magnet, Magnet]:
-    return config.train.suspension_magnet, config.train.guidance_magnet
-
-
-def _sperling(weighting: int, passages: Passages, config: Config) -> Found:
+def _sperling(weighting: int, passages: Passages) -> Found:
     return _of_cars(sperling_index(passages.weighted[:, weighting]))
 
 
-def _iso_2631(weighting: int, passages: Passages, config: Config) -> Found:
+def _iso_2631(weighting: int, passages: Passages) -> Found:
     return _of_cars(passages.weighted[:, weighting])
 
 
-def _dynamic_coefficient(passages: Passages, config: Config) -> Found:
+def _dynamic_coefficient(passages: Passages) -> Found:
     largest = passages.girder[:, 0]
     return Found(largest / passages.static_deflection, passages.girder_time[:, 0])
 
 
-def _deflection_over_span(passages: Passages, config: Config) -> Found:
-    return Found(passages.girder[:, 0] / config.guideway.span_length, passages.girder_time[:, 0])
+def _deflection_over_span(passages: Passages) -> Found:
+    return Found(passages.girder[:, 0] / passages.span_length, passages.girder_time[:, 0])
 
 
-_FOUND: Mapping[Response, Callable[[Passages, Config], Found]] = {
+_FOUND: Mapping[Response, Callable[[Passages], Found]] = {
     "girder_displacement_z": partial(_of_girder, 0),
     "girder_displacement_y": partial(_of_girder, 1),
     "girder_acceleration_z": partial(_of_girder, 2),
     "girder_acceleration_y": partial(_of_girder, 3),
-    "car_body_acceleration_z": lambda one, _: _of_cars(one.body_z, one.body_z_time),
-    "car_body_acceleration_y": lambda one, _: _of_cars(one.body_y, one.body_y_time),
+    "car_body_acceleration_z": lambda one: _of_cars(one.body_z, one.body_z_time),
+    "car_body_acceleration_y": lambda one: _of_cars(one.body_y, one.body_y_time),
     "suspension_gap_excursion": partial(_gap_excursion, 0),
     "guidance_gap_excursion": partial(_gap_excursion, 1),
     "suspension_current_share": partial(_current_share, 0),
     "guidance_current_share": partial(_current_share, 1),
-    "car_end_acceleration_z": lambda one, _: _of_cars(one.end_z, one.end_z_time),
-    "car_end_acceleration_y": lambda one, _: _of_cars(one.end_y, one.end_y_time),
+    "car_end_acceleration_z": lambda one: _of_cars(one.end_z, one.end_z_time),
+    "car_end_acceleration_y": lambda one: _of_cars(one.end_y, one.end_y_time),
     "sperling_index_z": partial(_sperling, 0),
     "sperling_index_y": partial(_sperling, 1),
     "iso2631_rms_z": partial(_iso_2631, 2),
     "iso2631_rms_y": partial(_iso_2631, 3),
     "dynamic_coefficient": _dynamic_coefficient,
     "deflection_over_span": _deflection_over_span,
-    "bearing_uplift": lambda one, _: Found(one.lift, one.lift_time),
+    "bearing_uplift": lambda one: Found(one.lift, one.lift_time),
 }
 """How each response follows from what is watched."""
+
+
+def in_their_order(parts: Sequence[Passages], rows: Sequence[IntArray]) -> Passages:
+    """Passages of one set from those of its groups, which may have different trains.
+
+    Parameters
+    ----------
+    parts
+        Passages of each group.
+    rows : group of (sample,)
+        Numbers of their samples.
+
+    Returns
+    -------
+    passages
+        Of all samples in order; a car that a train does not have is NaN.
+    """
+    order = np.argsort(np.concatenate(rows), kind="stable")
+
+    def joined(name: str) -> npt.NDArray:
+        arrays = [getattr(part, name) for part in parts]
+        if name == "time":
+            return arrays[0]
+        longest = tuple(np.max([one.shape[1:] for one in arrays], axis=0))
+        padded = [
+            np.pad(
+                one,
+                [(0, 0), *((0, most - n) for most, n in zip(longest, one.shape[1:], strict=True))],
+                constant_values=np.nan if one.dtype.kind == "f" else 0,
+            )
+            for one in arrays
+        ]
+        return np.concatenate(padded)[order]
+
+    return Passages(**{field.name: joined(field.name) for field in fields(Passages)})
 
 
 def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4) -> FloatArray:
