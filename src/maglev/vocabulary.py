@@ -127,9 +127,9 @@ SIGNED_RESPONSES: tuple[Response, ...] = PAPER_RESPONSES[:4]
 ``<name>_negative``."""
 
 RESPONSE_WORDS: Mapping[Response, str] = {
-    name: entry.words for name, entry in RESPONSE_TABLE.items()
+    name: entry.words.removeprefix("largest absolute ") for name, entry in RESPONSE_TABLE.items()
 }
-"""Meaning of each response."""
+"""Meaning of each response, as it stands before "exceeds a limit"."""
 
 RESPONSE_UNITS: Mapping[Response, str] = {
     name: entry.unit for name, entry in RESPONSE_TABLE.items()
