@@ -114,6 +114,11 @@ def quantity(
     )
 
 
+def _lists(value: Any) -> Any:
+    """A value with lists in place of tuples, as a file has them."""
+    return [_lists(one) for one in value] if isinstance(value, list | tuple) else value
+
+
 _IN_SI = {"numbers": "SI"}
 """Context of a validation whose numbers are in SI and carry no unit."""
 
@@ -167,13 +172,13 @@ class Parameters(BaseModel):
                 out[name] = [item.quantities() for item in value]
             elif isinstance(value, Mapping):
                 out[name] = {
-                    key: item.quantities() if isinstance(item, Parameters) else item
+                    key: item.quantities() if isinstance(item, Parameters) else _lists(item)
                     for key, item in value.items()
                 }
             elif isinstance(extra, dict) and extra.get("unit") and value is not None:
                 out[name] = f"{value!r} {extra['unit']}"
             elif isinstance(value, tuple):
-                out[name] = list(value)
+                out[name] = _lists(value)
             else:
                 out[name] = value
         return out
@@ -1360,8 +1365,6 @@ class Law(Parameters):
     def quantities(self) -> dict[str, Any]:
         """Return what the law says, as the configuration file would write it."""
         said = {name: value for name, value in super().quantities().items() if value is not None}
-        if self.quantiles is not None:
-            said["quantiles"] = [list(row) for row in self.quantiles]
         return said
 
 

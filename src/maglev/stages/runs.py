@@ -218,7 +218,7 @@ def _compute(
     ]
     others = {key: column for key, column in varied.items() if key not in GAIN_COLUMNS}
     computed = simulate(
-        config,
+        _plain(config) if others else config,
         np.column_stack([gains, *further]),
         values=others or None,
         track_seeds=seeds,
@@ -239,6 +239,13 @@ def _compute(
     with _FILES:
         datasets.write(computed, path, "passage", config=content(config, varied), code=_code())
     return path
+
+
+def _plain(config: Config) -> Config:
+    """The sections that decide a run as a configuration, whose numbers can be replaced."""
+    whole = config.quantities()
+    sections = {name: whole[name] for name in (*TRAIN_ON_GUIDEWAY, "gains")}
+    return Config.model_validate({**sections, "cases": {}})
 
 
 def _refuse_too_large_steps(gains: FloatArray, computed: xr.Dataset) -> None:
