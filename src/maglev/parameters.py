@@ -1161,6 +1161,14 @@ class LimitState(Parameters):
         None, description="how far the limit can be trusted"
     )
 
+    @field_validator("limit", mode="before")
+    @classmethod
+    def _read_number(cls, limit: Any) -> Any:
+        """Take a plain number that YAML leaves as text, such as 25e-5."""
+        if isinstance(limit, str) and re.fullmatch(r"[-+]?[0-9.]+([eE][-+]?[0-9]+)?", limit):
+            return float(limit)
+        return limit
+
     @property
     def threshold(self) -> float:
         """The limit in the SI unit of the response; NaN where there is none."""
@@ -1373,6 +1381,13 @@ def _all_gains(variation: float = 0.10, among: tuple[Gain, ...] = GAIN_KEYS) -> 
     return {f"gains.{gain}": Law(coefficient_of_variation=variation) for gain in among}
 
 
+WHY_NO_DESIGN = (
+    "a surrogate of the random quantities does not know the track of a passage, which decides more "
+    "of its extremes than they do; mcm counts over all tracks"
+)
+"""Reason why no method with a surrogate is carried out where tracks differ."""
+
+
 class Case(Parameters):
     """One case: what is random in it and how, its own values, and the methods."""
 
@@ -1416,9 +1431,14 @@ class Case(Parameters):
         return hash(repr(self))
 
     @property
-    def random_track(self) -> bool:
-        """Whether runs differ in their track."""
-        return self.track != "fixed"
+    def possible_methods(self) -> tuple[Method, ...]:
+        """Methods of the case that can be carried out.
+
+        A surrogate of the random quantities does not know the track of a passage: where tracks
+        differ, only the baseline is left (`WHY_NO_DESIGN`).
+        """
+        fixed = self.track == "fixed"
+        return tuple(name for name in self.methods if fixed or name == "mcm")
 
     @model_validator(mode="before")
     @classmethod

@@ -146,11 +146,11 @@ def test_intervals_of_imperfect_surrogates_cover_the_truth():
             states[f"{k} at {level}"] = {"response": PAPER_RESPONSES[k], "limit": limit}
             levels.append(level)
     whole = CONFIG.quantities()
-    study = {**whole["study"], "osm": {"n_runs": 40, "surrogate": "rbf"}}
+    study = {**whole["study"], "osm": {"n_runs": 30, "surrogate": "rbf"}}
     config = Config.model_validate({**whole, "cases": {}, "study": study, "limit_states": states})
     covered, off = [], []
     for seed in range(8):
-        design = synthetic.design(40, seed=seed)
+        design = synthetic.design(30, seed=seed)
         fitted = surrogate.dataset(config, "osm", design)
         found = limit_states.of_surrogate(config, design, fitted).isel(limit_state=slice(1, None))
         low, high = found["held_probability_low"], found["held_probability_high"]

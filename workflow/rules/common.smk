@@ -11,9 +11,19 @@ SWEEPS = [case for case in parameters.cases if parameters.cases[case].sweep]
 CASES = [case for case in parameters.cases if case not in SWEEPS]
 
 
+for case in CASES:
+    refused = [
+        method
+        for method in parameters.cases[case].methods
+        if method not in parameters.cases[case].possible_methods
+    ]
+    if refused:
+        logger.warning(f"cases.{case}: without {', '.join(refused)}: {WHY_NO_DESIGN}")
+
+
 def methods_of(case: str, among: tuple[str, ...] = METHODS) -> list[str]:
     """Methods that a case names, of some."""
-    named = parameters.cases[case].methods if case in CASES else ()
+    named = parameters.cases[case].possible_methods if case in CASES else ()
     return [one for one in among if one in named]
 
 
