@@ -103,6 +103,7 @@ def test_a_dry_run_of_all_lists_every_step_of_the_method(fresh):
         "fig_control_density": 1, "fig_control_limits": 1, "fig_stiffness": 1,
         "limit_state_table": 1, "fig_exceedance": 4,
         "tracks": 1, "line": 1, "fig_tracks": 1, "fig_track_limits": 1,
+        "density_in_time": 1, "fig_in_time": 1,
     }.items()  # fmt: skip
     assert fresh.would_run() == jobs
 

@@ -23,6 +23,7 @@ import xarray as xr
 from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.vocabulary import (
+    BARRIER_SOURCES,
     CAR_RESPONSES,
     DECISIONS,
     DENSITY_METHODS,
@@ -671,6 +672,55 @@ def _study_table() -> dict[str, Variable]:
         "lost_share_on_track": _number(
             "track", "1", "share of the points of the gains at which levitation is lost"
         ),
+        # responses over the time of a passage
+        "path_step": _number(
+            "path_step", "1", "number of the place along the path, every third at a time", "int32"
+        ),
+        "path": _number(
+            "sample response path_step",
+            OF_RESPONSE,
+            "response at each time, and its two turning points between two times; that of a car "
+            "body is its size, largest over the cars",
+        ),
+        "extreme_of_path": _number("sample response", OF_RESPONSE, "largest absolute response"),
+        "quantile_level": _number("quantile_level", "1", "probability that is not exceeded"),
+        "value_in_time": _number("response t cell", OF_RESPONSE, "response"),
+        "density_in_time": _number(
+            "response t cell",
+            PER_RESPONSE,
+            "probability density of the response of held samples at the time, by the GDEE",
+        ),
+        "held_in_time": _number("t", "1", "probability that levitation has held until the time"),
+        "mean_in_time": _number("response t", OF_RESPONSE, "mean of the response of held samples"),
+        "deviation_in_time": _number(
+            "response t", OF_RESPONSE, "standard deviation of the response of held samples"
+        ),
+        "quantile_in_time": _number(
+            "response t quantile_level", OF_RESPONSE, "quantile of the response of held samples"
+        ),
+        "kernel_in_time": _number(
+            "response t", OF_RESPONSE, "standard deviation that the scheme adds to each point"
+        ),
+        "nose": _number("t", "m", "place of the train's nose along travel, from the first pier"),
+        "train_length": _number("", "m", "length of the train"),
+        "guideway_length": _number("", "m", "length of the guideway, all spans"),
+        "barrier": _number(level, OF_RESPONSE, "size of the response that must not be reached"),
+        "barrier_source": _code(level, "what the barrier is", BARRIER_SOURCES),
+        "reliability": _number(
+            f"{level} t",
+            "1",
+            "probability that the barrier was not reached and levitation held until the time, by "
+            "the GDEE with absorbing barriers",
+        ),
+        "reliability_of_points": _number(
+            f"{level} t", "1", "the same share of the weighted histories themselves"
+        ),
+        "reliability_of_extreme": _number(
+            level, "1", "probability that the extreme stays below the barrier and levitation holds"
+        ),
+        "reliability_error": _number(
+            level, "1", "reliability at the end of the passage less that of the extreme"
+        ),
         # what figures show of several files
         "curve": _number("curve", "1", "case and method of the curve, see flag_meanings", "int32"),
         "curve_value": _number("curve response cell", OF_RESPONSE, "extreme"),
@@ -1161,6 +1211,33 @@ LAYOUTS: Mapping[str, Layout] = {
             "n_runs",
         ),
     ),
+    "histories": Layout(
+        title="Histories of responses, thinned",
+        variables=(*GAINS, "path", "extreme_of_path", "status", "lost_t"),
+        optional=("track_seed",),
+    ),
+    "density_in_time": Layout(
+        title="Density and first-passage reliability of responses over the time of a passage",
+        variables=(
+            "value_in_time",
+            "density_in_time",
+            "held_in_time",
+            "mean_in_time",
+            "deviation_in_time",
+            "quantile_in_time",
+            "kernel_in_time",
+            "nose",
+            "train_length",
+            "guideway_length",
+            "barrier",
+            "barrier_source",
+            "reliability",
+            "reliability_of_points",
+            "reliability_of_extreme",
+            "reliability_error",
+            "n_runs",
+        ),
+    ),
     "table1": Layout(
         title="Limits of the extremes by each method",
         variables=(
@@ -1411,7 +1488,6 @@ def write_netcdf(dataset: xr.Dataset, path: str | Path) -> None:
         encoding[name] = {"dtype": dtype, "_FillValue": None}
         if ordered[name].ndim:
             encoding[name] |= {"zlib": True, "complevel": 4, "shuffle": True}
-        ordered[name].encoding = {}
     aside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         ordered.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)

@@ -38,6 +38,7 @@ from maglev.vocabulary import (
     Gain,
     Group,
     Method,
+    RecordedResponse,
     Response,
     Surrogate,
 )
@@ -1070,6 +1071,30 @@ class Tracks(Parameters):
         return self
 
 
+class InTime(Parameters):
+    """Densities over the time of a passage: real histories at the representative points."""
+
+    cases: tuple[str, ...] = Field(
+        ("validation",), description="cases whose responses are followed; [] for none"
+    )
+    responses: tuple[RecordedResponse, ...] = Field(
+        ("girder_displacement_z", "car_body_acceleration_z"),
+        description="responses that are followed; that of the car body is its size, largest over "
+        "the cars",
+        min_length=1,
+    )
+    n_times: int = _count(
+        600, "times at which densities are given, from start to end of a passage", minimum=3
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> InTime:
+        for key, names in (("cases", self.cases), ("responses", self.responses)):
+            if len(set(names)) < len(names):
+                raise ValueError(f"{key} must not name anything twice, got {', '.join(names)}")
+        return self
+
+
 class Study(Parameters):
     """Settings of densities and limits, for all cases."""
 
@@ -1098,6 +1123,7 @@ class Study(Parameters):
     asm_paper: PaperDesign = PaperDesign()
     asm: TailDesign = TailDesign()
     tracks: Tracks = Tracks()
+    in_time: InTime = InTime()
 
     @model_validator(mode="after")
     def _check(self) -> Study:
@@ -2066,6 +2092,16 @@ class Config(Parameters):
                 elif getattr(self.gains, gain) < least:
                     return 0.0
         return probability
+
+    @model_validator(mode="after")
+    def _check_followed(self) -> Config:
+        for name in self.study.in_time.cases:
+            if self.cases and name not in self.cases and name not in _cases():
+                raise ValueError(
+                    f"study.in_time.cases: there is no case '{name}', known are: "
+                    f"{', '.join(self.cases)}"
+                )
+        return self
 
     @model_validator(mode="after")
     def _check(self) -> Config:

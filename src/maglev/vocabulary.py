@@ -22,6 +22,16 @@ class ResponseEntry(NamedTuple):
     timed: bool = True  # whether the value is of one moment, which is kept
 
 
+RecordedResponse = Literal[
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+    "car_body_acceleration_z",
+    "car_body_acceleration_y",
+]
+"""A response whose history is recorded."""
+
 _GIRDER = "of the girder at midspan of the middle span"
 _CAR = "of the car body, largest over the cars"
 _END = "at the ends of the car body's floor, largest over the cars"
@@ -217,6 +227,10 @@ likelier than the failure probability."""
 DENSITY_METHODS = ("gdee", "gdee_of_the_logarithm", "direct")
 """Method of a density: the GDEE; the GDEE of the logarithm of the extreme, where strays need too
 fine a mesh; direct, where there is no GDEE or it refused both."""
+
+BARRIER_SOURCES = ("limit", "mean_and_deviations")
+"""What a barrier of the first passage is: the limit of the extreme at the failure probability; or,
+where none is given, its mean and as many deviations as a normal variate has at that probability."""
 
 SOURCES = ("paper", "ours")
 """Source of a number."""

@@ -18,6 +18,7 @@ from maglev.figures import (
     density_by_control,
     draw,
     exceedance,
+    in_time,
     labels,
     layouts_of,
     limits_by_control,
@@ -264,6 +265,27 @@ def test_a_run_that_was_not_judged_is_marked_and_not_counted_as_lost(files):
         chart.get_legend_handles_labels()[1]
     )
     assert count.get_title(loc="left").startswith("(b) lost 1 of")
+
+
+def test_a_response_in_time_has_three_panels_and_its_errors_are_said(files):
+    data = datasets.read(files["in_time"][0], "density_in_time")
+    data["reliability_error"][:] = -0.004
+    fig, plotted = in_time.figure(data.isel(response=[0]))
+    assert fig.get_size_inches()[0] == style.COLUMN
+    titles = [axis.get_title(loc="left") for axis in fig.axes]
+    assert titles[:3] == [
+        "(a) midspan displacement, vert.",
+        "(b) density about the mean",
+        "(c) failure by first passage, 1 - R(t)",
+    ]
+    words = [text.get_text() for text in fig.axes[2].get_legend().get_texts()]
+    assert words[0] == f"{1.1e3 * study_files.CENTRE[0]:.4g} mm (0.1), error +0.004"
+    # nothing is known of the extreme beyond the last barrier: no circle
+    circles = [line for line in fig.axes[2].get_lines() if line.get_marker() == "o"]
+    assert len(circles) == 2
+    xr.testing.assert_identical(plotted, data.isel(response=[0]))
+    fig, _ = in_time.figure(data)  # the third leaves the place of a fourth empty
+    assert len([axis for axis in fig.axes if axis.get_title(loc="left")]) == 9
 
 
 def test_a_figure_says_of_which_track_its_numbers_are(tmp_path, files):

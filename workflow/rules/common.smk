@@ -82,6 +82,8 @@ def chunks(case: str) -> list[dict[str, str]]:
 def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str, str]]:
     """Names of the files of a role that has many."""
     case, every = case_of(wildcards), wildcards.get("scope") == "statistics_truth"
+    if stage.name == "density_in_time":  # barriers are the limits of the best method
+        return [{"method": methods_of(case, DESIGNED)[-1]}]
     if stage.name == "control_study":
         return [
             {"case": one, "method": method} if "method" in by else {"case": one}

@@ -118,6 +118,14 @@ DRAWN = {
         "what random gains and a random track contribute",
         [file_of("track_split", case=case) for case in TRACK_CASES[:1]],
     ),
+    **{
+        f"fig_in_time{f'_{case}' if k else ''}": (
+            "in_time",
+            f"densities over the time of a passage of '{case}'",
+            [file_of("density_in_time", case=case)],
+        )
+        for k, case in enumerate(followed_cases())
+    },
 }
 
 

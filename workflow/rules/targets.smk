@@ -56,12 +56,20 @@ def possible(stage, case: str) -> bool:
     if stage.name == "paper_and_ours" and RESPONSE not in parameters.responses_of_study:
         return False
     of_track = "track_runs" in (stage.name, *stage.inputs)
+    if stage.name == "density_in_time" and case not in parameters.study.in_time.cases:
+        return False
     if "tracks" in (stage.name, *stage.inputs) and not on_tracks(case):
         return False
     needed = [STAGES[role] for role, one in stage.inputs.items() if not one.optional]
     return (case in TRACK_CASES or not of_track) and all(
         methods_of(case, one.methods) for one in (stage, *needed)
     )
+
+
+def followed_cases() -> list[str]:
+    """Cases whose responses are followed over the time of a passage."""
+    stage = STAGES["density_in_time"]
+    return [case for case in parameters.cases if possible(stage, case)]
 
 
 def results() -> list[str]:

@@ -490,13 +490,14 @@ def cross(
     guiding_circuits = circuits_at_rest(guidance, guidance_law)
     watch = _new_watch(n_magnets, timing.sections.shape[0], outcome.extreme.shape[0])
     weighing = empty_weighing(timing.comfort, n_cars)
+    with_magnets = timing.record_every > 0 and outcome.history.shape[1] > 4 + 2 * n_cars
     stretch = -1
     for step in range(timing.first_step, timing.n_steps + 1):
         nose = timing.start + timing.speed * (step * dt)
         tail = nose - timing.train_length
         first = max(0, int(np.floor(tail / spans.span_length)))
         last = min(spans.n_spans - 1, int(np.floor(nose / spans.span_length)))
-        record = timing.record_every > 0 and step % timing.record_every == 0
+        record = with_magnets and step % timing.record_every == 0
         _advance_train(vehicle, dt, train)
         while stretch + 1 < stretches.first_step.size and step >= stretches.first_step[stretch + 1]:
             stretch += 1

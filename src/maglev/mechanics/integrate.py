@@ -131,6 +131,7 @@ def integrate(
     *,
     profile_of: Callable[[int], Profile] | None = None,
     record_every: int = 0,
+    with_magnets: bool = True,
     n_threads: int = 1,
     on_progress: Callable[[int], None] | None = None,
 ) -> Passages:
@@ -151,6 +152,8 @@ def integrate(
         not given.
     record_every
         Steps between recorded rows of the histories; zero records none.
+    with_magnets
+        Whether histories have the gaps and currents of the magnets, most of their size.
     n_threads
         Rows of samples that run at the same time.
     on_progress
@@ -183,7 +186,7 @@ def integrate(
     )
 
     def one_row(row: int) -> Outcome:
-        outcome = packing.empty_outcome(system.train, kinds, timing)
+        outcome = packing.empty_outcome(system.train, kinds, timing, with_magnets=with_magnets)
         lanes = np.ascontiguousarray(padded[row * LANES : (row + 1) * LANES].T)
         suspension_footprints, guidance_footprints = (
             system.suspension_footprints,

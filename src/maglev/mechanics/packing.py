@@ -483,19 +483,27 @@ def _comfort(config: Config) -> Comfort:
 
 
 def empty_outcome(
-    train: train_model.TrainModel, kinds: tuple[MagnetRows, MagnetRows], timing: Timing
+    train: train_model.TrainModel,
+    kinds: tuple[MagnetRows, MagnetRows],
+    timing: Timing,
+    *,
+    with_magnets: bool = True,
 ) -> Outcome:
-    """Results of a row of samples before the first step: those of a train at rest."""
+    """Results of a row of samples before the first step: those of a train at rest.
+
+    Without the magnets, histories have no room for their gaps and currents.
+    """
     n_cars = train.parameters.n_cars
     table = train.magnets
     n_magnets = table.x.size
     n_records = timing.n_steps // timing.record_every if timing.record_every else 0
     gap = np.array([[k.gap_reference] * LANES for k in kinds])
     current = np.array([[k.current_reference] * LANES for k in kinds])
-    history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets, LANES))
-    of_kind = table.is_guidance.astype(np.int64)
-    history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]
-    history[:, -n_magnets:] = current[of_kind]
+    history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets * with_magnets, LANES))
+    if with_magnets:
+        of_kind = table.is_guidance.astype(np.int64)
+        history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]
+        history[:, -n_magnets:] = current[of_kind]
     return Outcome(
         extreme=np.zeros((5 + 4 * n_cars, LANES)),
         extreme_time=np.zeros((5 + 4 * n_cars, LANES)),
