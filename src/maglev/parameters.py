@@ -1267,7 +1267,7 @@ ONCE_A_YEAR = 2.74e-5
 
 def _limit_states() -> dict[str, LimitState]:
     """The limit states that are shipped: those whose response there is."""
-    once = f"; target: once a year with 36,500 trains, assumed ({ONCE_A_YEAR:g} a passage)"
+    once = "; target: once a year with 36,500 trains, assumed"
     shipped: tuple[tuple[str, str, str | float, str, str], ...] = (
         (
             "suspension gap",
