@@ -19,6 +19,8 @@ for case in CASES:
     ]
     if refused:
         logger.warning(f"cases.{case}: without {', '.join(refused)}: {WHY_NO_DESIGN}")
+    if words := cost_words(parameters, case):
+        logger.warning(f"cases.{case}.random: {words}")
 
 
 def methods_of(case: str, among: tuple[str, ...] = METHODS) -> list[str]:
