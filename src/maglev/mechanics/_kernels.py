@@ -1,8 +1,8 @@
 """Compiled: the passage of a row of samples, step by step.
 
 Kernels take arrays and floats, write where they are told and check nothing: `integrate` has
-checked.  All samples of a row share the train's place, the track and the matrices; only the gains
-differ.
+checked.  All samples of a row share the train's place and what tables of the run stand on; the
+gains differ, the track may, and so may the train (`maglev.mechanics.lanes.own`).
 """
 
 from __future__ import annotations
@@ -20,8 +20,16 @@ from maglev.mechanics._records import (
     Rails,
     Watch,
 )
-from maglev.mechanics._rows import gather, project, transform, transform_both, weighted_sum, zeros
-from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, store
+from maglev.mechanics._rows import (
+    gather,
+    own_sum,
+    project,
+    transform,
+    transform_both,
+    weighted_sum,
+    zeros,
+)
+from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, own_of, store
 
 
 @kernel()
@@ -61,8 +69,8 @@ def _advance_train(vehicle, dt, train):
     The velocity that the forces see is predicted from the last two accelerations.
     """
     half = 0.5 * dt
-    for i in range(vehicle.inverse_mass.size):
-        a = load(train.force, i) * entry(vehicle.inverse_mass, i)
+    for i in range(train.force.shape[0]):
+        a = load(train.force, i) * own_of(vehicle.inverse_mass, vehicle.mass_number, i)
         v = fma(a, dt, load(train.velocity, i))
         store(train.position, i, fma(v, dt, load(train.position, i)))
         store(train.predicted, i, fma(load(train.before, i), -half, fma(a, dt, v)))
@@ -75,19 +83,21 @@ def _links(vehicle, train, scaled, pull):
     """Put the forces of springs and dampers on the train."""
     for k in range(vehicle.scaled_dof.size):
         i = entry(vehicle.scaled_dof, k)
-        along = load(train.position, i) * entry(vehicle.scaled_stiffness, k)
+        stiffness = own_of(vehicle.scaled_stiffness, vehicle.stiffness_number, k)
+        along = load(train.position, i) * stiffness
         rate = load(train.predicted, i)
-        store(scaled, k, fma(rate, entry(vehicle.scaled_damping, k), along))
-    coefficient, start = vehicle.link_coefficient, vehicle.link_start
+        damping = own_of(vehicle.scaled_damping, vehicle.damping_number, k)
+        store(scaled, k, fma(rate, damping, along))
+    coefficient, start, number = vehicle.link_coefficient, vehicle.link_start, vehicle.link_number
     none = load(train.position, 0) * 0.0
     for i in range(start.size - 1):
         first, last = entry(start, i), entry(start, i + 1)
-        total = weighted_sum(coefficient, vehicle.link_scaled, first, last, scaled, none)
+        total = own_sum(coefficient, number, vehicle.link_scaled, first, last, scaled, none)
         store(pull, i, total)
-    coefficient, start = vehicle.pull_coefficient, vehicle.pull_start
+    coefficient, start, number = vehicle.pull_coefficient, vehicle.pull_start, vehicle.pull_number
     for i in range(start.size - 1):
         first, last = entry(start, i), entry(start, i + 1)
-        total = weighted_sum(coefficient, vehicle.pull_link, first, last, pull, none)
+        total = own_sum(coefficient, number, vehicle.pull_link, first, last, pull, none)
         store(train.force, i, none - total)
 
 
@@ -330,8 +340,9 @@ def _watch_cars(vehicle, run, step, train, watch, outcome):
     record = run.record_every > 0 and step % run.record_every == 0
     for car in range(n_cars):
         vertical, lateral = vehicle.body_z[car], vehicle.body_y[car]
-        up = load(train.force, vertical) * vehicle.inverse_mass[vertical]
-        across = load(train.force, lateral) * vehicle.inverse_mass[lateral]
+        mass, number = vehicle.inverse_mass, vehicle.mass_number
+        up = load(train.force, vertical) * own_of(mass, number, vertical)
+        across = load(train.force, lateral) * own_of(mass, number, lateral)
         _keep_peak(outcome, watch, 4 + car, up, step * dt, dt)
         _keep_peak(outcome, watch, 4 + n_cars + car, across, step * dt, dt)
         if record:
@@ -358,11 +369,11 @@ def _note_lost(run, watch, outcome, time):
             continue
         for magnet in range(watch.magnet_min.shape[0]):
             low, high = watch.magnet_min[magnet, lane], watch.magnet_max[magnet, lane]
-            if low > run.gap_contact and high < run.gap_lost:
+            if low > run.gap_contact[lane] and high < run.gap_lost[lane]:
                 continue
-            if low <= run.gap_contact:
+            if low <= run.gap_contact[lane]:
                 outcome.status[lane] = CONTACT
-            elif high >= run.gap_lost:
+            elif high >= run.gap_lost[lane]:
                 outcome.status[lane] = GAP_LOST
             else:
                 outcome.status[lane] = NOT_FINITE
@@ -384,7 +395,7 @@ def _all_lost(run, watch, outcome, time):
     for lane in range(LANES):
         low = min(outcome.gap_min[0, lane], outcome.gap_min[1, lane])
         high = max(outcome.gap_max[0, lane], outcome.gap_max[1, lane])
-        if not (low > run.gap_contact and high < run.gap_lost):
+        if not (low > run.gap_contact[lane] and high < run.gap_lost[lane]):
             return _note_lost(run, watch, outcome, time) == 0
     return False
 
@@ -412,7 +423,7 @@ def passage(
     """
     n_cars, n_magnets = vehicle.body_z.size, 2 * (suspension.x.size + guidance.x.size)
     dt, stretches = run.time_step, spans.stretches
-    train = at_rest(vehicle.inverse_mass.size)
+    train = at_rest(vehicle.pull_start.size - 1)
     guideway = at_rest(spans.square.size + spans.stiffness_start.size - 1)
     rails = _straight_rails(spans)
     scaled, pull = zeros(vehicle.scaled_dof.size), zeros(vehicle.link_start.size - 1)

@@ -1,6 +1,8 @@
 """What the kernels read and write: records of arrays, all samples of a row side by side.
 
 Arrays that end in ``LANES`` hold one number for each sample of a row; the others are shared by all.
+Where "own" stands beside an array (n,) or a number, each sample may have its own: it is then a table
+of distinct rows (distinct, LANES), and the array of numbers named there says which row is whose.
 """
 
 from __future__ import annotations
@@ -20,16 +22,21 @@ class Vehicle(NamedTuple):
     on; each degree of freedom is scaled so once for every kind of link that it meets.
     """
 
-    inverse_mass: np.ndarray  # (dof,)
+    inverse_mass: np.ndarray  # (dof,) own by mass_number
+    mass_number: np.ndarray
     scaled_dof: np.ndarray  # (scaled,) degree of freedom
-    scaled_stiffness: np.ndarray  # (scaled,)
-    scaled_damping: np.ndarray  # (scaled,)
+    scaled_stiffness: np.ndarray  # (scaled,) own by stiffness_number
+    stiffness_number: np.ndarray
+    scaled_damping: np.ndarray  # (scaled,) own by damping_number
+    damping_number: np.ndarray
     link_start: np.ndarray  # (link + 1,) what pulls in a link
     link_scaled: np.ndarray  # (non-zero,)
-    link_coefficient: np.ndarray  # (non-zero,)
+    link_coefficient: np.ndarray  # (non-zero,) own by link_number
+    link_number: np.ndarray
     pull_start: np.ndarray  # (dof + 1,) the links that pull at a degree of freedom
     pull_link: np.ndarray  # (non-zero,)
-    pull_coefficient: np.ndarray  # (non-zero,)
+    pull_coefficient: np.ndarray  # (non-zero,) own by pull_number
+    pull_number: np.ndarray
     body_z: np.ndarray  # (car,) degree of freedom
     body_y: np.ndarray  # (car,)
 
@@ -41,17 +48,21 @@ class MagnetRows(NamedTuple):
     number: np.ndarray  # (row, side) place in the train's table of magnets
     translation: np.ndarray  # (row, side) degree of freedom
     rotation: np.ndarray  # (row, side)
-    static_force: np.ndarray  # (row, side) [N]
-    static_moment: np.ndarray  # (row, side) [N m]
-    constant: np.ndarray  # (row, side, pole) K of F = K (i/gap)^2 [N m^2/A^2]
+    static_force: np.ndarray  # (row side,) [N] own by force_number
+    force_number: np.ndarray
+    static_moment: np.ndarray  # (row side,) [N m] own by moment_number
+    moment_number: np.ndarray
+    constant: np.ndarray  # (row side pole,) K of F = K (i/gap)^2 [N m^2/A^2] own by constant_number
+    constant_number: np.ndarray
     offset: np.ndarray  # (pole,) ahead of the centre [m]
     arm: np.ndarray  # (pole,) displacement of the pole per rotation [m]
     outward: np.ndarray  # (side,) sign of the displacement that opens the gap
-    gap_reference: float  # [m]
-    current_reference: float  # [A]
-    current_max: float  # [A]
-    mass: float  # [kg]
-    inertia: float  # [kg m^2]
+    gap_reference: float | np.ndarray  # [m] own, one row
+    current_reference: float | np.ndarray  # [A] own, one row
+    current_max: np.ndarray  # (row side,) [A] own by current_number
+    current_number: np.ndarray
+    mass: float | np.ndarray  # [kg] own, one row
+    inertia: float | np.ndarray  # [kg m^2] own, one row
     is_guidance: bool
 
 
@@ -68,9 +79,10 @@ class Law(NamedTuple):
     senses: np.ndarray  # (pole,) whether the pole's gap feeds a circuit
     first: np.ndarray  # (pole,) the two circuits whose mean is the current of a pole
     second: np.ndarray
-    decay: float  # of the current in a step; zero without a lag [-]
-    command_now: float  # weights of the command at this step and the last in the current [-]
-    command_before: float
+    lags: bool  # some sample's current follows its command with a lag
+    decay: float | np.ndarray  # of the current in a step; zero without a lag [-] own, one row
+    command_now: float | np.ndarray  # weight of the command at this step in the current [-] own
+    command_before: float | np.ndarray  # and at the last
     delays: bool
     ring: int  # signals of so many steps are kept
     behind: int  # steps back to the latest of the three signals that a delayed one is taken from
@@ -210,8 +222,8 @@ class Run(NamedTuple):
     speed: float
     start: float  # place of the nose at time zero [m]
     train_length: float
-    gap_contact: float
-    gap_lost: float
+    gap_contact: np.ndarray  # (LANES,) [m]
+    gap_lost: np.ndarray  # (LANES,) [m]
     sections: np.ndarray  # (section, 6) low-pass on guideway accelerations
     record_every: int  # steps between recorded rows; zero: none
 

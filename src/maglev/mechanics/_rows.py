@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from maglev.compiled import kernel
-from maglev.mechanics.lanes import LANES, WIDE, entry, fma, load, store
+from maglev.mechanics.lanes import LANES, WIDE, entry, fma, load, own_of, store
 
 CACHE_LINE = 8
 """Doubles in a line of the processor's cache [-]."""
@@ -27,6 +27,14 @@ def weighted_sum(coefficients, places, start, stop, source, total):
     """``total + Σ_k coefficients[k] source[places[k]]`` for ``start`` ≤ k < ``stop``."""
     for k in range(start, stop):
         total = fma(load(source, entry(places, k)), entry(coefficients, k), total)
+    return total
+
+
+@kernel()
+def own_sum(coefficients, numbers, places, start, stop, source, total):
+    """As `weighted_sum`, with coefficients that each sample may have of its own."""
+    for k in range(start, stop):
+        total = fma(load(source, entry(places, k)), own_of(coefficients, numbers, k), total)
     return total
 
 

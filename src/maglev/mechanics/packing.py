@@ -32,6 +32,10 @@ from maglev.mechanics.step_limit import step_response
 from maglev.parameters import Circuit, Config, Guideway, Magnet
 
 
+_SHARED = np.zeros(0, dtype=np.int64)
+"""Numbers of rows where all samples share one number."""
+
+
 @dataclass(frozen=True)
 class Ground:
     """Where poles of one kind can be after whole numbers of steps, and the sag of the rails there.
@@ -61,15 +65,20 @@ def vehicle(train: train_model.TrainModel) -> Vehicle:
     scaled, number = np.unique(hangs, axis=0, return_inverse=True)
     return Vehicle(
         inverse_mass=1.0 / train.mass,
+        mass_number=_SHARED,
         scaled_dof=scaled[:, 0].astype(np.int64),
         scaled_stiffness=np.ascontiguousarray(scaled[:, 1]),
+        stiffness_number=_SHARED,
         scaled_damping=np.ascontiguousarray(scaled[:, 2]),
+        damping_number=_SHARED,
         link_start=rows.indptr.astype(np.int64),
         link_scaled=number.ravel().astype(np.int64),
         link_coefficient=rows.data.astype(np.float64),
+        link_number=_SHARED,
         pull_start=columns.indptr.astype(np.int64),
         pull_link=columns.indices.astype(np.int64),
         pull_coefficient=columns.data.astype(np.float64),
+        pull_number=_SHARED,
         body_z=np.ascontiguousarray(train.car_body_dof[:, 1], dtype=np.int64),
         body_y=np.ascontiguousarray(train.car_body_dof[:, 0], dtype=np.int64),
     )
@@ -96,17 +105,19 @@ def magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
         number=number.astype(np.int64),
         translation=table.translation_dof[number].astype(np.int64),
         rotation=table.rotation_dof[number].astype(np.int64),
-        static_force=rest.sum(axis=2),
-        static_moment=(rest * arm).sum(axis=2),
-        constant=np.ascontiguousarray(
-            rest * (magnet.gap_reference / magnet.current_reference) ** 2
-        ),
+        static_force=rest.sum(axis=2).ravel(),
+        force_number=_SHARED,
+        static_moment=(rest * arm).sum(axis=2).ravel(),
+        moment_number=_SHARED,
+        constant=(rest * (magnet.gap_reference / magnet.current_reference) ** 2).ravel(),
+        constant_number=_SHARED,
         offset=offset,
         arm=arm,
         outward=np.array([1.0, -1.0 if guidance else 1.0]),
         gap_reference=magnet.gap_reference,
         current_reference=magnet.current_reference,
-        current_max=magnet.current_max,
+        current_max=np.full(number.size, magnet.current_max),
+        current_number=_SHARED,
         mass=magnet.mass,
         inertia=magnet.inertia,
         is_guidance=guidance,
@@ -154,6 +165,7 @@ def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: FloatArray)
         senses=np.any(group.feed, axis=0).astype(np.int64),
         first=np.array([pair[0] for pair in pairs], dtype=np.int64),
         second=np.array([pair[-1] for pair in pairs], dtype=np.int64),
+        lags=circuit.lag > 0,
         decay=late.decay,
         command_now=late.now,
         command_before=late.before,
@@ -452,8 +464,8 @@ def run(config: Config, record_every: int) -> Run:
         speed=passage.speed,
         start=way.start,
         train_length=config.train.length,
-        gap_contact=passage.gap_contact,
-        gap_lost=passage.gap_lost,
+        gap_contact=np.full(LANES, passage.gap_contact),
+        gap_lost=np.full(LANES, passage.gap_lost),
         sections=np.ascontiguousarray(acceleration_filter(passage, way.time_step)),
         record_every=record_every,
     )

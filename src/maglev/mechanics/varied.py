@@ -8,14 +8,14 @@ share one.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.parameters import Config
+from maglev.parameters import Config, Parameters
 
 Cost = Literal["sample", "guideway", "rebuild"]
 """What a number costs that differs from sample to sample, from nothing much to a new system."""
@@ -149,3 +149,18 @@ def equal_samples(columns: Iterable[FloatArray], n_samples: int) -> list[IntArra
     _, group = np.unique(table, axis=0, return_inverse=True)
     group = group.ravel()
     return [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
+
+
+def with_arrays(section: Parameters, arrays: Mapping[str, FloatArray]) -> Any:
+    """Copy of parameters with arrays (sample,) in place of numbers at dotted keys, unchecked."""
+    inner: dict[str, dict[str, FloatArray]] = {}
+    changed: dict[str, Any] = {}
+    for key, array in arrays.items():
+        first, _, rest = key.partition(".")
+        if rest:
+            inner.setdefault(first, {})[rest] = array
+        else:
+            changed[first] = array
+    for name, nested in inner.items():
+        changed[name] = with_arrays(getattr(section, name), nested)
+    return section.model_copy(update=changed)
