@@ -63,8 +63,8 @@ rule all:
 rule truth:
     input:
         [
-            place(stage, case=case, method=BASELINE)
+            file_of(stage, case=case, method=BASELINE)
             for stage in ("baseline", "density", "limits")
             for case in parameters.cases
         ],
-        place("statistics_check", scope="statistics_truth"),
+        file_of("statistics_check", scope="statistics_truth"),

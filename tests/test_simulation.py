@@ -240,7 +240,9 @@ def test_an_irregularity_file_shorter_than_the_run_is_refused(tmp_path):
     config = small()
     end = track_range(config)[1]
     path = written(tmp_path / "short.csv", config, end - 3.0)
-    with pytest.raises(ValueError, match=r"must cover the run from -5 to .* m, got -10 to .* m$"):
+    with pytest.raises(
+        ValueError, match=r"must cover the passage from -5 to .* m, got -10 to .* m$"
+    ):
         simulate(small(irregularity={"profile_file": str(path)}), MEAN[None])
     path = written(tmp_path / "long.csv", config, end + 3.0)
     measured = simulate(small(irregularity={"profile_file": str(path)}), MEAN[None])

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev.errors import UserError
+from maglev.parameters import Config, Parameters
 from maglev.simulation import cost_of, simulate
 from test_simulation import MEAN, small
 
@@ -71,3 +72,90 @@ def test_histories_need_one_course():
 def test_a_number_costs_what_its_kind_costs():
     keys = ["train.rod.mass", "control.guidance.lag", "passage.approach", "guideway.span_length"]
     assert list(cost_of(small(), keys).values()) == ["sample", "sample", "rebuild", "rebuild"]
+
+
+def numbers_of(section, place):
+    """Dotted keys of all numbers of a section that may differ."""
+    for name, value in section:
+        if isinstance(value, Parameters):
+            yield from numbers_of(value, f"{place}.{name}")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield f"{place}.{name}"
+
+
+def late():
+    config = small(2, 2, irregularity={"lateral": {"law": "german"}})
+    circuit = {"group": "ends", "lag": "1 ms"}
+    control = {"suspension": {"lag": "1 ms", "delay": "0.4 ms"}, "guidance": circuit}
+    return Config.model_validate(config.quantities() | {"control": control, "cases": {}})
+
+
+KEYS = [
+    key
+    for section in ("train", "irregularity", "control", "passage")
+    for key in numbers_of(getattr(late(), section), section)
+    if cost_of(late(), [key])[key] == "sample"
+]
+SPREAD = 0.25  # 2.5 deviations at a coefficient of variation of 0.1
+
+
+def test_every_number_of_the_train_is_among_the_samples_own():
+    assert len(KEYS) == 49
+    assert {"train.rod.pivot_z", "control.guidance.lag", "passage.gap_lost"} < set(KEYS)
+    assert {"irregularity.vertical.coefficient", "irregularity.lateral.roughness"} < set(KEYS)
+
+
+def drawn(config, keys, n_samples, seed=0):
+    """Values at both ends of each key, then at random ends of all at once."""
+    sign = np.random.default_rng(seed).choice([-1.0, 1.0], size=(n_samples, len(keys)))
+    values = {}
+    for key, column in zip(keys, sign.T, strict=True):
+        number, _ = config.number_at(key)
+        values[key] = (number or 0.1) * (1 + SPREAD * column)
+    return values
+
+
+@pytest.mark.parametrize("key", KEYS)
+def test_a_row_with_numbers_of_its_own_equals_a_system_built_anew(key):
+    config = late()
+    number = config.number_at(key)[0] or 0.1
+    ends = np.array([1 - SPREAD, 1 + SPREAD]) * number
+    together = simulate(config, MEAN * np.ones((2, 1)), values={key: ends})
+    plain = simulate(config, MEAN[None])
+    moved = 0.0
+    for sample, end in enumerate(ends):
+        alone = simulate(config.with_numbers({key: float(end)}), MEAN[None])
+        for name in EXTREMES:
+            assert_allclose(together[name][sample], alone[name][0], rtol=1e-10)
+            moved = max(moved, abs(float(alone[name][0] / plain[name][0]) - 1))
+    without_effect = ("passage.gap_contact", "passage.gap_lost", "current_max")
+    assert moved > 1e-9 or key.endswith(without_effect)
+
+
+def test_all_numbers_at_once_equal_a_system_built_anew():
+    config = late()
+    values = drawn(config, KEYS, 20)
+    gains = MEAN * np.linspace(0.9, 1.1, 20)[:, None]
+    together = simulate(config, gains, values=values)
+    for sample in (0, 17):
+        numbers = {key: float(column[sample]) for key, column in values.items()}
+        alone = simulate(config.with_numbers(numbers), gains[sample : sample + 1])
+        for name in EXTREMES:
+            assert_allclose(together[name][sample], alone[name][0], rtol=1e-10)
+
+
+def test_a_sample_of_its_own_does_not_know_its_neighbours():
+    config = late()
+    values = drawn(config, KEYS, 20)
+    seeds = np.arange(20) % 3
+    gains = MEAN * np.linspace(0.9, 1.1, 20)[:, None]
+    together = simulate(config, gains, values=values, track_seeds=seeds, n_threads=2)
+    few = [18, 3]
+    alone = simulate(
+        config,
+        gains[few],
+        values={key: column[few] for key, column in values.items()},
+        track_seeds=seeds[few],
+    )
+    for name in EXTREMES:
+        assert_array_equal(together[name][few], alone[name])

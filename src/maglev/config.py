@@ -259,7 +259,7 @@ def _shown(value: Any) -> str:
 
 def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, list[str]]:
     """Return the dotted key, without the tags of unions, and the known keys beside it."""
-    place: list[str] = []
+    dotted: list[str] = []
     candidates: tuple[Any, ...] = (model,)
     named: Any = None
     for part in loc:
@@ -271,7 +271,7 @@ def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, li
         if tagged:
             candidates = tuple(tagged)
             continue
-        place.append(str(part))
+        dotted.append(str(part))
         fields = [c.model_fields[part] for c in candidates if part in c.model_fields]
         annotation = fields[0].annotation if fields else named
         named = None
@@ -280,12 +280,12 @@ def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, li
             continue
         members = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
         candidates = tuple(m for m in members if isinstance(m, type) and issubclass(m, Parameters))
-    return ".".join(place), [name for c in candidates for name in c.model_fields]
+    return ".".join(dotted), [name for c in candidates for name in c.model_fields]
 
 
-def _unit_of(model: type[Parameters], place: str) -> str:
-    """Unit of the quantity at a dotted place, with a space before it; empty if it has none."""
-    *outer, last = place.split(".")
+def _unit_of(model: type[Parameters], dotted: str) -> str:
+    """Unit of the quantity at a dotted key, with a space before it; empty if it has none."""
+    *outer, last = dotted.split(".")
     for name in outer:
         annotation = model.model_fields[name].annotation if name in model.model_fields else None
         if not (isinstance(annotation, type) and issubclass(annotation, Parameters)):
@@ -325,21 +325,21 @@ _PHRASES = {
 def _sentence(model: type[Parameters], mapping: Mapping[str, Any], error: ErrorDetails) -> str:
     """Turn one finding of pydantic into a sentence with the dotted key and the value as written."""
     kind, loc, context = error["type"], error["loc"], error.get("ctx", {})
-    place, known = _keys_of(model, loc)
+    dotted, known = _keys_of(model, loc)
     if kind == "value_error":  # our own words, which begin with the key inside its section
-        return f"{place}.{context['error']}" if place else str(context["error"])
+        return f"{dotted}.{context['error']}" if dotted else str(context["error"])
     if kind == "missing":
-        return f"{place} is missing"
+        return f"{dotted} is missing"
     if kind == "extra_forbidden":
-        section, _, key = place.rpartition(".")
+        section, _, key = dotted.rpartition(".")
         _, known = _keys_of(model, loc[:-1])
         near = difflib.get_close_matches(key, known, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(known)}"
-        return f"{place} is not a known key{f' of {section}' if section else ''}; {hint}"
+        return f"{dotted} is not a known key{f' of {section}' if section else ''}; {hint}"
     value: Any = mapping
-    for part in place.split("."):
+    for part in dotted.split("."):
         value = value.get(part) if isinstance(value, Mapping) else error["input"]
     phrase = _PHRASES.get(kind)
     if phrase is None:
-        return f"{place}: {error['msg']}, got {_shown(value)}"
-    return f"{place} {phrase.format(unit=_unit_of(model, place), **context)}, got {_shown(value)}"
+        return f"{dotted}: {error['msg']}, got {_shown(value)}"
+    return f"{dotted} {phrase.format(unit=_unit_of(model, dotted), **context)}, got {_shown(value)}"

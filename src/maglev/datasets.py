@@ -274,7 +274,7 @@ def _study_table() -> dict[str, Variable]:
         ),
         "round": _number("round", "1", "number of the round, 0 is the first design", "int32"),
         "step": _number("step", "1", "number of the step towards more runs", "int32"),
-        "cell": _number("cell", "1", "number of the place along the value", "int32"),
+        "cell": _number("cell", "1", "number of the value", "int32"),
         "check": _number("check", "1", "number of the check", "int32"),
         # points and runs
         "standard": _number(

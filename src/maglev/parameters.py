@@ -1307,14 +1307,14 @@ class Config(Parameters):
                 )
         return {name: case for name, case in cases.items() if case is not None}
 
-    def with_values(self, values: Mapping[str, Any], place: str = "") -> Config:
+    def with_values(self, values: Mapping[str, Any], prefix: str = "") -> Config:
         """Return the configuration with other values at dotted keys, written as in a file.
 
         Parameters
         ----------
         values
             Such as ``{"passage.speed": "500 km/h"}``.
-        place
+        prefix
             What the keys belong to, for messages.
 
         Raises
@@ -1327,19 +1327,20 @@ class Config(Parameters):
             keys = dotted.split(".")
             if keys[0] not in _OF_A_CASE or len(keys) < 2:
                 raise UserError(
-                    f"{place}{dotted} cannot be set for a case alone; the sections that can are "
+                    f"{prefix}{dotted} cannot be set for a case alone; the sections that can are "
                     f"{', '.join(_OF_A_CASE)}, such as passage.speed"
                 )
             if dotted == "guideway.n_spans":
-                raise UserError(f"{place}{dotted} is the case's n_spans: write it there")
+                raise UserError(f"{prefix}{dotted} is the case's n_spans: write it there")
             try:
                 changed = _with_value(changed, keys, value)
             except ValidationError as error:
                 why = error.errors()[0]["msg"].removeprefix("Value error, ")
-                raise UserError(f"{place}{dotted}: {why}") from None
+                raise UserError(f"{prefix}{dotted}: {why}") from None
             except KeyError as error:
                 raise UserError(
-                    f"{place}{dotted} is no key of the configuration: there is no {error.args[0]!r}"
+                    f"{prefix}{dotted} is no key of the configuration: "
+                    f"there is no {error.args[0]!r}"
                 ) from None
         return changed
 

@@ -93,13 +93,12 @@ def simulate(
     ------
     UserError
         If the gains have another shape or are not finite, the time step exceeds the stability
-        limit, the irregularity is shorter than the run, the solver is unknown, the seeds are
+        limit, the irregularity does not cover the passage, the solver is unknown, the seeds are
         not whole numbers from zero, one for each sample of the production solver, or a value is of
-        no number of the configuration, or will not do for it.
+        no number of the configuration, or will not do for it, or the
+        reference solver does not reach its accuracy.
     FileNotFoundError
         If the irregularity's file does not exist.
-    RuntimeError
-        If the reference solver does not reach its accuracy.
 
     References
     ----------
@@ -164,9 +163,11 @@ def _groups(
 ) -> list[_Group]:
     """Samples in groups of equal values of what is built anew; all of it for the reference."""
     cost = cost_of(config, values)
-    built = [key for key in values if cost[key] == "rebuild" or solver == "reference"]
-    built = list(values)
+    built = [key for key in values if cost[key] != "sample" or solver == "reference"]
     own = tuple(key for key in values if key not in built)
+    for sample in range(n_samples if own else 0):  # refused before anything is computed
+        numbers = {key: float(values[key][sample]) for key in values}
+        config.with_numbers(numbers, f"sample {sample}: ")
     found = []
     for rows in equal_samples([values[key] for key in built], n_samples):
         numbers = {key: float(values[key][rows[0]]) for key in built}
@@ -211,6 +212,7 @@ def _run(
     passages = integrate.integrate(
         _system(config, _track_file_hash(config)),
         gains[rows],
+        values={key: values[key][rows] for key in group.own},
         profile_of=None if seeds is None else _tracks_of(config, [seeds[k] for k in rows]),
         record_every=every,
         n_threads=n_threads,
@@ -233,7 +235,7 @@ def track(config: Config, seed: int | None = None) -> Profile:
     Raises
     ------
     UserError, FileNotFoundError
-        If a measured profile cannot be read or is shorter than the run.
+        If a measured profile cannot be read or does not cover the passage.
 
     Examples
     --------

@@ -199,11 +199,11 @@ def test_a_measured_profile_is_kept_in_its_own_rows():
 
 @pytest.mark.parametrize("length_range", [(-120.0, 100.5), (-20.0, 150.0)])
 def test_a_measured_profile_shorter_than_the_run_is_refused(length_range):
-    expected = rf"must cover the run from .* to {length_range[1]:g} m, got -100 to 100 m"
+    expected = rf"must cover the passage from .* to {length_range[1]:g} m, got -100 to 100 m"
     with pytest.raises(ValueError, match=expected):
         profile(Irregularity(), length_range, seed=0, measured=constant())
     late = Measured("late", np.linspace(-40.0, 200.0, 9), np.zeros((4, 9)))
-    with pytest.raises(ValueError, match="late must cover the run from -50 to"):
+    with pytest.raises(ValueError, match="late must cover the passage from -50 to"):
         profile(Irregularity(), (-120.0, 150.0), seed=0, measured=late)
 
 

@@ -120,16 +120,16 @@ def test_an_entry_is_that_of_the_array_as_it_lies():
     table = RNG.normal(size=(3, 5))
 
     @numba.njit
-    def read(array, places, out):
-        for k in range(places.size):
-            out[k] = entry(array, places[k])
+    def read(array, indices, out):
+        for k in range(indices.size):
+            out[k] = entry(array, indices[k])
 
-    places, out = np.array([0, 4, 7, 14]), np.zeros(4)
-    read(table, places, out)
-    assert_array_equal(out, table.ravel()[places])
+    indices, out = np.array([0, 4, 7, 14]), np.zeros(4)
+    read(table, indices, out)
+    assert_array_equal(out, table.ravel()[indices])
     if not numba.config.DISABLE_JIT:
         with pytest.raises(numba.core.errors.TypingError, match="entry needs an array in C order"):
-            read(np.asfortranarray(table), places, out)
+            read(np.asfortranarray(table), indices, out)
 
 
 @pytest.mark.parametrize("n_rows", [1, 7, 64])
@@ -184,7 +184,7 @@ def test_a_peak_between_two_steps_is_kept_with_its_time(frequency):
     profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
     system = integrate.prepare(config, profile)
     kinds = (system.suspension, system.guidance)
-    outcome = packing.empty_outcome(system.train, kinds, packing.run(config, 0))
+    outcome = packing.empty_outcome(system.train, kinds, packing.timing(config, 0))
 
     def motion(step):
         ahead = step * dt - crest

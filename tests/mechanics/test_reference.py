@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from maglev.errors import UserError
 from maglev.mechanics import course as course_module
 from maglev.mechanics import (
     guideway,
@@ -15,6 +16,7 @@ from maglev.mechanics import (
     irregularity,
     reference,
     reference_magnets,
+    reference_step,
 )
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course, track_range
@@ -342,8 +344,19 @@ def test_an_error_that_stays_too_large_is_refused():
         mock.patch.object(reference, "MOST_HALVINGS", 1),
         mock.patch.object(reference, "FIRST_STEP", 1e-3),
     ):
-        with pytest.raises(RuntimeError, match=r"^reference: expected errors of at most 1e-06 %"):
+        with pytest.raises(UserError, match=r"^reference: expected errors of at most 1e-06 %"):
             reference.solve(config, profile_of(config), [MEAN], tolerance=1e-8)
+
+
+def test_pole_forces_that_do_not_converge_are_refused():
+    config = small(5, cutoff=300.0)
+    with (
+        mock.patch.object(reference_step, "MOST_ITERATIONS", 1),
+        pytest.raises(
+            UserError, match=r"^reference: the pole forces must converge in 1 iter.* t ="
+        ),
+    ):
+        reference.integrate(config, profile_of(config), [MEAN])
 
 
 @lru_cache

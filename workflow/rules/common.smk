@@ -32,8 +32,8 @@ if CONTROL_CASES and methods_of(TABLE_CASE, DESIGNED):
     CONTROL_CASES.insert(0, TABLE_CASE)
 
 
-def place(stage: str, **names: str) -> str:
-    """Where a file of a stage lies, for such names of its wildcards."""
+def file_of(stage: str, **names: str) -> str:
+    """Path of the file of a stage, for such names of its wildcards."""
     return f"<results>/{FILES[stage]}".format(**names)
 
 
@@ -90,7 +90,7 @@ def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str,
     }[by]()
 
 
-def places_of(stage, wildcards) -> dict[str, list[tuple[dict[str, str], str]]]:
+def files_of(stage, wildcards) -> dict[str, list[tuple[dict[str, str], str]]]:
     """Files of every role of a stage, each with its names."""
     found = {}
     own = {"case": case_of(wildcards), "method": wildcards.get("method")}
@@ -101,7 +101,7 @@ def places_of(stage, wildcards) -> dict[str, list[tuple[dict[str, str], str]]]:
             continue
         else:
             names = [{}]
-        found[role] = [(each, place(role, **{**own, **each})) for each in names]
+        found[role] = [(each, file_of(role, **{**own, **each})) for each in names]
     return found
 
 
@@ -111,8 +111,8 @@ def inputs_of(stage):
     def found(wildcards) -> dict[str, str | list[str]]:
         of = {"case": case_of(wildcards), "method": wildcards.get("method")}
         files = {
-            role: [path for _, path in places]
-            for role, places in places_of(stage, wildcards).items()
+            role: [path for _, path in paths]
+            for role, paths in files_of(stage, wildcards).items()
         }
         named = stage.files(parameters, **of)
         return {"config": config_of(stage, **of), **named, **files}
@@ -125,13 +125,13 @@ def options_of(stage):
 
     def written(wildcards, input) -> str:
         given = {"case": case_of(wildcards), "store": STORE, **dict(wildcards.items())}
-        places = places_of(stage, wildcards)
+        files = files_of(stage, wildcards)
         words = []
         for option in stage.options:
             if option == "config":
                 words += [flag(option), input.config]
-            elif option in places:
-                for (names, _), path in zip(places[option], input[option], strict=True):
+            elif option in files:
+                for (names, _), path in zip(files[option], input[option], strict=True):
                     words += [flag(option), *names.values(), path]
             elif option in given:
                 words += [flag(option), given[option]]

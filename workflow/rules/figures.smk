@@ -5,29 +5,29 @@ DRAWN = {
     "fig7": (
         "irregularity",
         "track irregularity and its spectra",
-        [place("irregularity")],
+        [file_of("irregularity")],
     ),
     "fig8": (
         "deflection",
         "midspan deflection and dynamic coefficient",
-        [place("deflection"), place("dynamic_factor")],
+        [file_of("deflection"), file_of("dynamic_factor")],
     ),
-    "histories": ("histories", "histories of the six responses", [place("passage")]),
-    "gaps": ("gaps", "gaps and currents of the magnets", [place("passage")]),
+    "histories": ("histories", "histories of the six responses", [file_of("passage")]),
+    "gaps": ("gaps", "gaps and currents of the magnets", [file_of("passage")]),
     "modes": (
         "modes",
         "modes and frequencies of the guideway",
-        [place("guideway_modes")],
+        [file_of("guideway_modes")],
     ),
     "fig_stiffness": (
         "stiffness_check",
         "static deflection against frequency, whatever the stiffness",
-        [place("stiffness_check")],
+        [file_of("stiffness_check")],
     ),
     "fig_train_modes": (
         "train_modes",
         "frequencies and damping of the train's modes",
-        [place("train_modes")],
+        [file_of("train_modes")],
     ),
     "fig9": (
         "training",
@@ -91,7 +91,7 @@ DRAWN = {
     "fig_stability": (
         "stability",
         "which gains of the suspension hold the train",
-        of_baseline("baseline") and [place("stability"), *of_baseline("baseline")],
+        of_baseline("baseline") and [file_of("stability"), *of_baseline("baseline")],
     ),
     "fig_accuracy": (
         "accuracy",
@@ -116,7 +116,7 @@ DRAWN = {
     "fig_track_split": (
         "track_split",
         "what random gains and a random track contribute",
-        [place("track_split", case=case) for case in TRACK_CASES[:1]],
+        [file_of("track_split", case=case) for case in TRACK_CASES[:1]],
     ),
 }
 

@@ -16,25 +16,25 @@ def judged(case: str) -> bool:
 def of_methods(stage: str, case: str) -> list[str]:
     """Files of a stage of each method of a case that it is made for."""
     methods = methods_of(case, STAGES[stage].methods)
-    return [place(stage, case=case, method=method) for method in methods]
+    return [file_of(stage, case=case, method=method) for method in methods]
 
 
 def of_baseline(stage: str) -> list[str]:
     """The file of the baseline of the case of the tables, if it has one."""
     has_one = methods_of(TABLE_CASE, (BASELINE,))
-    return [place(stage, case=TABLE_CASE, method=BASELINE)] if has_one else []
+    return [file_of(stage, case=TABLE_CASE, method=BASELINE)] if has_one else []
 
 
 def of_judged(stage: str) -> list[str]:
     """The file of the case of the tables, if its methods can be judged by a baseline."""
-    return [place(stage, case=TABLE_CASE)] if judged(TABLE_CASE) else []
+    return [file_of(stage, case=TABLE_CASE)] if judged(TABLE_CASE) else []
 
 
 def of_last_method(cases: list[str], *stages: str) -> list[str]:
     """A file of each stage and case by the last of its methods with a surrogate, or none at all."""
     designed = [methods_of(case, DESIGNED) for case in cases]
     return [
-        place(stage, case=case, method=methods[-1])
+        file_of(stage, case=case, method=methods[-1])
         for stage in stages
         for case, methods in zip(cases, designed, strict=True)
         if all(designed)
@@ -50,7 +50,7 @@ def on_tracks(case: str) -> bool:
 
 def of_line() -> list[str]:
     """The file of the line, if there are tracks of the case of the tables."""
-    return [place("line")] if on_tracks(TABLE_CASE) else []
+    return [file_of("line")] if on_tracks(TABLE_CASE) else []
 
 
 def possible(stage, case: str) -> bool:
@@ -67,17 +67,19 @@ def possible(stage, case: str) -> bool:
 def results() -> list[str]:
     """The file of every stage for all cases and methods that are named."""
     files = (
-        [place("statistics_check", scope="statistics")] if checked_cases(False) else []
+        [file_of("statistics_check", scope="statistics")]
+        if checked_cases(False)
+        else []
     )
     for name, stage in STAGES.items():
         wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
         if name == "control_study" and not CONTROL_CASES:
             continue
         if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
-            files.append(place(name))
+            files.append(file_of(name))
         if wildcards == {"case"}:
             cases = [case for case in parameters.cases if possible(stage, case)]
-            files += [place(name, case=case) for case in cases]
+            files += [file_of(name, case=case) for case in cases]
         if wildcards == {"case", "method"}:
             files += [
                 file for case in parameters.cases for file in of_methods(name, case)

@@ -66,8 +66,8 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         axis.set_ylim(0.7 / n, 1.3)
         baseline = at.isel(curve=truth)
         held = (baseline["curve_exceedance"] - baseline["curve_lost_probability"]).to_numpy()
-        places = baseline["curve_value"].to_numpy()
-        inside = places[(held < 0.999 * held.max()) & (held > 1.5 / n)]
+        values = baseline["curve_value"].to_numpy()
+        inside = values[(held < 0.999 * held.max()) & (held > 1.5 / n)]
         margin = 0.05 * np.ptp(inside)
         axis.set_xlim(shown.scale * (inside.min() - margin), shown.scale * (inside.max() + margin))
         axis.locator_params(axis="x", nbins=5)

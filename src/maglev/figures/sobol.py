@@ -24,7 +24,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         The figure and the numbers in it.
     """
     gains = labels.gains_of(data)
-    place = np.arange(len(gains))[::-1]
+    row = np.arange(len(gains))[::-1]
     colours = [labels.GAIN_COLOUR[number] for number in gains]
     fig, panels = labels.response_panels(3.9)
     for response, axis, _ in panels:
@@ -34,7 +34,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
             low, high = (at[f"{name}_{end}"].to_numpy() for end in ("low", "high"))
             reach = np.abs([middle - low, high - middle])
             axis.barh(
-                place + shift,
+                row + shift,
                 middle,
                 height=0.36,
                 color=colours if filled else "white",
@@ -43,7 +43,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
                 xerr=reach,
                 error_kw={"elinewidth": 0.8, "capsize": 1.5, "ecolor": "#000000"},
             )
-        axis.set_yticks(place, [labels.GAIN[number] for number in gains])
+        axis.set_yticks(row, [labels.GAIN[number] for number in gains])
         axis.grid(visible=False, axis="y")
         axis.set_xlim(0, 1.05)
         error = float(at["leave_one_out_error"])

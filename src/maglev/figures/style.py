@@ -98,7 +98,7 @@ def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None
 def table(
     axis: Axes,
     rows: Sequence[Sequence[str]],
-    places: Sequence[float],
+    columns: Sequence[float],
     colours: Sequence[str],
     height: float,
 ) -> None:
@@ -110,7 +110,7 @@ def table(
         Panel, which loses its axes.
     rows
         The heading and the rows, a text per column.
-    places
+    columns
         Left end of each column [share of the width].
     colours
         Colour of each row behind the heading.
@@ -121,7 +121,7 @@ def table(
     for number, row in enumerate(rows):
         y = 0.97 - height * number
         colour = "#000000" if number == 0 else colours[number - 1]
-        for x, text in zip(places, row, strict=True):
+        for x, text in zip(columns, row, strict=True):
             axis.text(x, y, text, color=colour, fontsize=7, va="top", transform=axis.transAxes)
     y = 0.97 - height + 0.035
     axis.plot([0.0, 1.0], [y, y], color="#000000", lw=0.5, transform=axis.transAxes)

@@ -297,13 +297,13 @@ def _low_pass(sections, direction, watch, incoming):
 
 
 @kernel()
-def _watch_midspan(spans, run, step, direction, rest, guideway, watch, outcome):
+def _watch_midspan(spans, timing, step, direction, rest, guideway, watch, outcome):
     """Displacement of midspan, and its acceleration a step late.
 
     What left-out modes add follows the forces at once; its acceleration, a second difference, is
     that of the step before, and so is what it joins.
     """
-    dt = run.time_step
+    dt = timing.time_step
     shift = rest * 0.0
     raw = shift
     n_columns = spans.output_column.size
@@ -319,11 +319,11 @@ def _watch_midspan(spans, run, step, direction, rest, guideway, watch, outcome):
     store(watch.left_out, 3 * direction, rest)
     store(watch.left_out, 3 * direction + 1, change)
     store(watch.left_out, 3 * direction + 2, raw)
-    smooth = _low_pass(run.sections, direction, watch, smooth)
+    smooth = _low_pass(timing.sections, direction, watch, smooth)
     time = step * dt
     _keep_peak(outcome, watch, direction, shift, time, dt)
     _keep_peak(outcome, watch, 2 + direction, smooth, time - dt, dt)
-    every = run.record_every
+    every = timing.record_every
     if every > 0 and step % every == 0:
         store(outcome.history[step // every - 1], direction, shift)
         store(outcome.history[step // every - 1], 2 + direction, smooth)
@@ -333,11 +333,11 @@ def _watch_midspan(spans, run, step, direction, rest, guideway, watch, outcome):
 
 
 @kernel()
-def _watch_cars(vehicle, run, step, train, watch, outcome):
+def _watch_cars(vehicle, timing, step, train, watch, outcome):
     """Accelerations of the car bodies."""
-    dt = run.time_step
+    dt = timing.time_step
     n_cars = vehicle.body_z.size
-    record = run.record_every > 0 and step % run.record_every == 0
+    record = timing.record_every > 0 and step % timing.record_every == 0
     for car in range(n_cars):
         vertical, lateral = vehicle.body_z[car], vehicle.body_y[car]
         mass, number = vehicle.inverse_mass, vehicle.mass_number
@@ -346,22 +346,22 @@ def _watch_cars(vehicle, run, step, train, watch, outcome):
         _keep_peak(outcome, watch, 4 + car, up, step * dt, dt)
         _keep_peak(outcome, watch, 4 + n_cars + car, across, step * dt, dt)
         if record:
-            row = step // run.record_every - 1
+            row = step // timing.record_every - 1
             store(outcome.history[row], 4 + car, up)
             store(outcome.history[row], 4 + n_cars + car, across)
 
 
 @kernel()
-def _record_magnets(run, step, n_cars, watch, outcome):
+def _record_magnets(timing, step, n_cars, watch, outcome):
     """Mean gap and current of each magnet."""
-    row, at, n = step // run.record_every - 1, 4 + 2 * n_cars, watch.magnet_gap.shape[0]
+    row, at, n = step // timing.record_every - 1, 4 + 2 * n_cars, watch.magnet_gap.shape[0]
     for magnet in range(n):
         store(outcome.history[row], at + magnet, load(watch.magnet_gap, magnet))
         store(outcome.history[row], at + n + magnet, load(watch.magnet_current, magnet))
 
 
 @kernel()
-def _note_lost(run, watch, outcome, time):
+def _note_lost(timing, watch, outcome, time):
     """Name the samples whose levitation is lost at this step; return how many still hold."""
     holding = 0
     for lane in range(LANES):
@@ -369,11 +369,11 @@ def _note_lost(run, watch, outcome, time):
             continue
         for magnet in range(watch.magnet_min.shape[0]):
             low, high = watch.magnet_min[magnet, lane], watch.magnet_max[magnet, lane]
-            if low > run.gap_contact[lane] and high < run.gap_lost[lane]:
+            if low > timing.gap_contact[lane] and high < timing.gap_lost[lane]:
                 continue
-            if low <= run.gap_contact[lane]:
+            if low <= timing.gap_contact[lane]:
                 outcome.status[lane] = CONTACT
-            elif high >= run.gap_lost[lane]:
+            elif high >= timing.gap_lost[lane]:
                 outcome.status[lane] = GAP_LOST
             else:
                 outcome.status[lane] = NOT_FINITE
@@ -390,20 +390,20 @@ def _note_lost(run, watch, outcome, time):
 
 
 @kernel()
-def _all_lost(run, watch, outcome, time):
+def _all_lost(timing, watch, outcome, time):
     """Look for gaps out of bounds at this step; return whether no sample holds any more."""
     for lane in range(LANES):
         low = min(outcome.gap_min[0, lane], outcome.gap_min[1, lane])
         high = max(outcome.gap_max[0, lane], outcome.gap_max[1, lane])
-        if not (low > run.gap_contact[lane] and high < run.gap_lost[lane]):
-            return _note_lost(run, watch, outcome, time) == 0
+        if not (low > timing.gap_contact[lane] and high < timing.gap_lost[lane]):
+            return _note_lost(timing, watch, outcome, time) == 0
     return False
 
 
 @kernel(nogil=True)
-def passage(
-    vehicle, suspension, guidance, suspension_law, guidance_law, suspension_places,
-    guidance_places, spans, run, gains, outcome,
+def cross(
+    vehicle, suspension, guidance, suspension_law, guidance_law, suspension_footprints,
+    guidance_footprints, spans, timing, gains, outcome,
 ):  # fmt: skip
     """Take one row of samples over the guideway.
 
@@ -413,8 +413,8 @@ def passage(
     ----------
     vehicle, suspension, guidance, suspension_law, guidance_law
         The train, its magnets and their circuits.
-    suspension_places, guidance_places, spans, run
-        What the poles meet, the guideway and the passage.
+    suspension_footprints, guidance_footprints, spans, timing
+        The rail under the poles' faces, the guideway, and steps and bounds of the passage.
     gains : (8, LANES)
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d, suspension k_a [A s²/m],
         k_i [A/(m s)], guidance k_a, k_i.
@@ -422,7 +422,7 @@ def passage(
         Receives the results; extremes start at zero, gaps at the reference.
     """
     n_cars, n_magnets = vehicle.body_z.size, 2 * (suspension.x.size + guidance.x.size)
-    dt, stretches = run.time_step, spans.stretches
+    dt, stretches = timing.time_step, spans.stretches
     train = at_rest(vehicle.pull_start.size - 1)
     guideway = at_rest(spans.square.size + spans.stiffness_start.size - 1)
     rails = _straight_rails(spans)
@@ -432,14 +432,14 @@ def passage(
     guiding = empty_magnet(guidance, guidance_law)
     lifting_circuits = circuits_at_rest(suspension, suspension_law)
     guiding_circuits = circuits_at_rest(guidance, guidance_law)
-    watch = _new_watch(n_magnets, run.sections.shape[0], outcome.extreme.shape[0])
+    watch = _new_watch(n_magnets, timing.sections.shape[0], outcome.extreme.shape[0])
     stretch = -1
-    for step in range(run.first_step, run.n_steps + 1):
-        nose = run.start + run.speed * (step * dt)
-        tail = nose - run.train_length
+    for step in range(timing.first_step, timing.n_steps + 1):
+        nose = timing.start + timing.speed * (step * dt)
+        tail = nose - timing.train_length
         first = max(0, int(np.floor(tail / spans.span_length)))
         last = min(spans.n_spans - 1, int(np.floor(nose / spans.span_length)))
-        record = run.record_every > 0 and step % run.record_every == 0
+        record = timing.record_every > 0 and step % timing.record_every == 0
         _advance_train(vehicle, dt, train)
         while stretch + 1 < stretches.first_step.size and step >= stretches.first_step[stretch + 1]:
             stretch += 1
@@ -449,20 +449,20 @@ def passage(
         _move_rails(spans, first, last, tail, nose, guideway, packed, rails)
         _links(vehicle, train, scaled, pull)
         attract(
-            suspension_places, suspension, suspension_law, step, dt, gains, train, rails, lifting,
-            lifting_circuits, record, watch, outcome,
+            suspension_footprints, suspension, suspension_law, step, dt, gains, train, rails,
+            lifting, lifting_circuits, record, watch, outcome,
         )  # fmt: skip
         attract(
-            guidance_places, guidance, guidance_law, step, dt, gains, train, rails, guiding,
-            guiding_circuits, record, watch, outcome,
+            guidance_footprints, guidance, guidance_law, step, dt, gains, train, rails,
+            guiding, guiding_circuits, record, watch, outcome,
         )  # fmt: skip
         rest_z, rest_y = _load_guideway(spans, first, last, tail, nose, rails, turn, guideway)
         if stretch >= 0:
             _answer(spans, stretch, guideway)
-        _watch_midspan(spans, run, step, 0, rest_z, guideway, watch, outcome)
-        _watch_midspan(spans, run, step, 1, rest_y, guideway, watch, outcome)
-        _watch_cars(vehicle, run, step, train, watch, outcome)
+        _watch_midspan(spans, timing, step, 0, rest_z, guideway, watch, outcome)
+        _watch_midspan(spans, timing, step, 1, rest_y, guideway, watch, outcome)
+        _watch_cars(vehicle, timing, step, train, watch, outcome)
         if record:
-            _record_magnets(run, step, n_cars, watch, outcome)
-        if _all_lost(run, watch, outcome, step * dt):
+            _record_magnets(timing, step, n_cars, watch, outcome)
+        if _all_lost(timing, watch, outcome, step * dt):
             return

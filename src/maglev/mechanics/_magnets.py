@@ -50,11 +50,11 @@ def circuits_at_rest(rows, law):
 
 
 @kernel()
-def _look(places, rows, law, row, side, step, train, rails, magnet):
+def _look(footprints, rows, law, row, side, step, train, rails, magnet):
     """Gap error of each pole of a magnet, and its rate where a circuit is fed by it."""
     field = 2 if rows.is_guidance else side
     motion, motion_rate = rails.motion[field], rails.rate[field]
-    own_track = places.rail.shape[2] > 1
+    own_track = footprints.rail.shape[2] > 1
     translation, rotation = rows.translation[row, side], rows.rotation[row, side]
     shift, turn = load(train.position, translation), load(train.position, rotation)
     shift_rate = load(train.predicted, translation)
@@ -62,26 +62,26 @@ def _look(places, rows, law, row, side, step, train, rails, magnet):
     none = shift * 0.0
     n_poles = rows.offset.size
     for p in range(n_poles):
-        here = entry(places.number, row * n_poles + p) + step
+        here = entry(footprints.number, row * n_poles + p) + step
         at = 2 * here + side
         arm = entry(rows.arm, p)
-        first = entry(places.first, here)
-        begin, end = entry(places.start, here), entry(places.start, here + 1)
-        rail = load(places.rail, at) if own_track else none + entry(places.rail, at)
-        rail = met(rail, places.level, entry(places.sag, at), places.sagging)
+        first = entry(footprints.first, here)
+        begin, end = entry(footprints.start, here), entry(footprints.start, here + 1)
+        rail = load(footprints.rail, at) if own_track else none + entry(footprints.rail, at)
+        rail = met(rail, footprints.level, entry(footprints.sag, at), footprints.sagging)
         if entry(law.senses, p) > 0:
-            rise = load(places.ramp, at) if own_track else none + entry(places.ramp, at)
-            rise = met(rise, places.level, entry(places.sag_rise, at), places.sagging)
+            rise = load(footprints.ramp, at) if own_track else none + entry(footprints.ramp, at)
+            rise = met(rise, footprints.level, entry(footprints.sag_rise, at), footprints.sagging)
             for j in range(begin, end):
-                weight = entry(places.weight, j)
+                weight = entry(footprints.weight, j)
                 deflection = load(motion, first + j - begin)
                 rail = fma(deflection, weight, rail)
-                rise = fma(deflection, entry(places.rise, j), rise)
+                rise = fma(deflection, entry(footprints.rise, j), rise)
                 rise = fma(load(motion_rate, first + j - begin), weight, rise)
             store(magnet.rate, p, fma(turn_rate, arm, shift_rate) - rise)
         else:
             for j in range(begin, end):
-                rail = fma(load(motion, first + j - begin), entry(places.weight, j), rail)
+                rail = fma(load(motion, first + j - begin), entry(footprints.weight, j), rail)
         store(magnet.error, p, fma(turn, arm, shift) - rail)
 
 
@@ -243,29 +243,29 @@ def _answer_acceleration(rows, law, row, side, gains, train, magnet, circuits, f
 
 
 @kernel()
-def _press(places, rows, row, side, step, rails, magnet):
+def _press(footprints, rows, row, side, step, rails, magnet):
     """Spread the pulls over the rail under the poles' faces."""
     pressed = rails.force[2 if rows.is_guidance else side]
     n_poles = rows.offset.size
     for p in range(n_poles):
-        here = entry(places.number, row * n_poles + p) + step
-        first = entry(places.first, here)
-        begin, end = entry(places.start, here), entry(places.start, here + 1)
+        here = entry(footprints.number, row * n_poles + p) + step
+        first = entry(footprints.first, here)
+        begin, end = entry(footprints.start, here), entry(footprints.start, here + 1)
         pull = load(magnet.pull, p)
         for j in range(begin, end):
             at = first + j - begin
-            store(pressed, at, fma(pull, entry(places.weight, j), load(pressed, at)))
+            store(pressed, at, fma(pull, entry(footprints.weight, j), load(pressed, at)))
 
 
 @kernel()
 def attract(
-    places, rows, law, step, dt, gains, train, rails, magnet, circuits, keep, watch, outcome
+    footprints, rows, law, step, dt, gains, train, rails, magnet, circuits, keep, watch, outcome
 ):
     """Close all magnets of one kind: gaps, currents, forces on train and rails.
 
     Parameters
     ----------
-    places, rows, law
+    footprints, rows, law
         Where the poles are, the magnets, and how their circuits work.
     step, dt
         Number of the step and its length [s].
@@ -289,7 +289,7 @@ def attract(
         for side in range(2):
             sign = rows.outward[side]
             translation, rotation = rows.translation[row, side], rows.rotation[row, side]
-            _look(places, rows, law, row, side, step, train, rails, magnet)
+            _look(footprints, rows, law, row, side, step, train, rails, magnet)
             _control(rows, law, row, side, step, dt, gains, train, magnet, circuits)
             total, moment, smallest, largest, strong = _attract(rows, law, row, side, gains, magnet)
             magnet_place = 2 * row + side
@@ -304,7 +304,7 @@ def attract(
                 force, turn = force + more, turn + more_turn
             store(train.force, translation, force)
             store(train.force, rotation, turn)
-            _press(places, rows, row, side, step, rails, magnet)
+            _press(footprints, rows, row, side, step, rails, magnet)
             number = rows.number[row, side]
             store(watch.magnet_min, number, smallest)
             store(watch.magnet_max, number, largest)

@@ -1,8 +1,8 @@
 """What the kernels read and write: records of arrays, all samples of a row side by side.
 
-Arrays that end in ``LANES`` hold one number for each sample of a row; the others are shared by all.
-Where "own" stands beside an array (n,) or a number, each sample may have its own: it is then a table
-of distinct rows (distinct, LANES), and the array of numbers named there says which row is whose.
+Arrays that end in ``LANES`` hold one number for each sample of a row; all share the others.
+Where "own" stands beside an array (n,) or a number, each sample may have its own: it is then a
+table of distinct rows (distinct, LANES), and the array named there says which row is whose.
 """
 
 from __future__ import annotations
@@ -201,8 +201,8 @@ class Spans(NamedTuple):
     rest: np.ndarray  # (3, stride) midspan z by z, y by roll and y of its left-out modes [m/N]
 
 
-class Places(NamedTuple):
-    """What a pole's face meets at every place it can be at after a whole number of steps."""
+class Footprints(NamedTuple):
+    """Rail under a pole's face, wherever the face can be after a whole number of steps."""
 
     number: np.ndarray  # (row, pole) place at time zero; each step moves on by one
     first: np.ndarray  # (place,) first of the rail coefficients under the face
@@ -211,10 +211,14 @@ class Places(NamedTuple):
     rise: np.ndarray  # of the coefficients in the mean rate over a step as the pole moves on [1/s]
     rail: np.ndarray  # (place, side, 1 or LANES) irregularity of all samples, or of each [m]
     ramp: np.ndarray  # (place, side, 1 or LANES) its rate at the pole [m/s]
+    level: float | np.ndarray  # factor on both [-]; own, one row: then the sag is not in them
+    sag: np.ndarray  # (place side,) standing sag [m], where levels are own
+    sag_rise: np.ndarray  # (place side,) its rate at the pole [m/s]
+    sagging: float | np.ndarray  # factor on the sag [-] own, one row
 
 
-class Run(NamedTuple):
-    """One passage and how it is watched."""
+class Timing(NamedTuple):
+    """Steps and speed of a passage, bounds of the gaps, and how responses are watched."""
 
     first_step: int  # until then the train rests
     n_steps: int

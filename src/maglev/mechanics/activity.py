@@ -48,7 +48,7 @@ class Stretch:
 
 
 def stretches(config: Config, reduced: ReducedGuideway) -> list[Stretch]:
-    """Divide a passage into stages, from the step on which the nose reaches the guideway.
+    """Divide a passage into stretches, from the step on which the nose reaches the guideway.
 
     Parameters
     ----------

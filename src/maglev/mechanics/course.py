@@ -1,4 +1,4 @@
-"""Course of a run: start, end, time step, and the stretch of track under the train."""
+"""Course of a passage: start, end, time step, and the stretch of track under the train."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ error of first order unless it falls half-way between two steps (docs/theory/int
 
 @dataclass(frozen=True)
 class Course:
-    """The run of a train from start to end, in steps.
+    """Motion of the train from start to end of a passage, in steps.
 
     Attributes
     ----------

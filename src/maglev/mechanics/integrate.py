@@ -2,44 +2,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from maglev.arrays import BoolArray, FloatArray
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import packing
 from maglev.mechanics import train as train_model
-from maglev.mechanics._kernels import passage
+from maglev.mechanics._kernels import cross
 from maglev.mechanics._records import (
     COMPLETED,
     NOT_FINITE,
     STEP_TOO_LARGE,
+    Footprints,
+    Law,
     MagnetRows,
     Outcome,
-    Places,
-    Run,
     Spans,
+    Timing,
     Vehicle,
 )
 from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.linear import Block
+from maglev.mechanics.own import OwnTrain, own_footprints, own_law, own_timing, own_train
 from maglev.mechanics.reduction import ReducedGuideway, reduce
 from maglev.mechanics.responses import Passages, checked_gains
 from maglev.mechanics.step_limit import (
+    Headroom,
     guideway_limit,
+    headroom,
     safe_gains,
     samples_too_fast,
     step_holds,
     train_limit,
     train_parts,
+    trains_too_fast,
 )
+from maglev.mechanics.trains import own_rates
 from maglev.parameters import Config
 
 
@@ -52,12 +58,14 @@ class System:
     vehicle: Vehicle
     suspension: MagnetRows
     guidance: MagnetRows
-    suspension_places: Places
-    guidance_places: Places
+    suspension_footprints: Footprints
+    guidance_footprints: Footprints
     grounds: tuple[packing.Ground, packing.Ground]
     spans: Spans
     parts: tuple[Block, ...]
     safe_gains: FloatArray
+    headroom: Headroom
+    profile: Profile
     config: Config
 
 
@@ -83,7 +91,7 @@ def prepare(config: Config, profile: Profile) -> System:
     Raises
     ------
     UserError
-        If the time step exceeds the stability limit or the profile is shorter than the run.
+        If the time step exceeds the stability limit or the profile does not cover the passage.
     """
     train = train_model.build(config.train)
     guideway = guideway_model.build(config.guideway)
@@ -96,8 +104,10 @@ def prepare(config: Config, profile: Profile) -> System:
     _check_step(config, reduced, parts)
     _check_reach(config, profile)
     suspension, guidance = (packing.magnet_rows(train, guidance=kind) for kind in (False, True))
-    suspension_places, suspension_ground = packing.places(config, suspension, guideway, reduced)
-    guidance_places, guidance_ground = packing.places(config, guidance, guideway, reduced)
+    suspension_footprints, suspension_ground = packing.footprints(
+        config, suspension, guideway, reduced
+    )
+    guidance_footprints, guidance_ground = packing.footprints(config, guidance, guideway, reduced)
     grounds = (suspension_ground, guidance_ground)
     tracks = packing.tracks(config, grounds, [profile])
     return System(
@@ -106,12 +116,14 @@ def prepare(config: Config, profile: Profile) -> System:
         vehicle=packing.vehicle(train),
         suspension=suspension,
         guidance=guidance,
-        suspension_places=suspension_places._replace(rail=tracks[0][0], ramp=tracks[0][1]),
-        guidance_places=guidance_places._replace(rail=tracks[1][0], ramp=tracks[1][1]),
+        suspension_footprints=suspension_footprints._replace(rail=tracks[0][0], ramp=tracks[0][1]),
+        guidance_footprints=guidance_footprints._replace(rail=tracks[1][0], ramp=tracks[1][1]),
         grounds=grounds,
         spans=packing.spans(reduced, config),
         parts=parts,
         safe_gains=safe_gains(parts, _mean_gains(config), course(config).time_step),
+        headroom=headroom(parts, _mean_gains(config), own_rates(train), course(config).time_step),
+        profile=profile,
         config=config,
     )
 
@@ -120,6 +132,7 @@ def integrate(
     system: System,
     gains: FloatArray,
     *,
+    values: Mapping[str, FloatArray] | None = None,
     profile_of: Callable[[int], Profile] | None = None,
     record_every: int = 0,
     n_threads: int = 1,
@@ -138,6 +151,9 @@ def integrate(
     gains : (sample, 4) or (sample, 8)
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d; then suspension k_a [A s²/m],
         k_i [A/(m s)], guidance k_a, k_i, those of the configuration if left out.
+    values : key of (sample,)
+        Numbers in SI of each sample in place of those of the configuration, by dotted keys whose
+        cost is that of a sample (`maglev.mechanics.varied.cost_of`).
     profile_of
         Track irregularity of a sample by its number; the one that ``system`` was prepared with if
         not given.
@@ -156,61 +172,165 @@ def integrate(
     Raises
     ------
     UserError
-        If the gains have the wrong shape or are not finite.
+        If the gains have the wrong shape or are not finite, or a train of the samples' own cannot
+        rest.
     """
-    config = system.config
-    gains = checked_gains(gains, config.gains.further)
-    n_samples = gains.shape[0]
-    n_rows = -(-n_samples // LANES)
-    padded = np.empty((n_rows * LANES, 8))
-    padded[:n_samples] = gains
-    padded[n_samples:] = gains[-1]
-    run = packing.run(config, record_every)
-    kinds = (system.suspension, system.guidance)
-    suspension_law, guidance_law = (
-        packing.law(circuit, rows, run.time_step, gains)
-        for circuit, rows in zip(
-            (config.control.suspension, config.control.guidance), kinds, strict=True
+    gains = checked_gains(gains, system.config.gains.further)
+    batch = _batch(system, gains, values or {}, profile_of, record_every)
+    outcomes: list[Outcome] = []
+    too_fast = []
+    n_rows = -(-gains.shape[0] // LANES)
+    with ThreadPoolExecutor(max_workers=n_threads) as pool:
+        for first in range(0, n_rows, BLOCK):
+            rows = range(first, min(first + BLOCK, n_rows))
+            arguments, of_block = _block(batch, rows)
+
+            def one_row(row: int, arguments: Callable[[int], tuple] = arguments) -> Outcome:
+                ready = arguments(row)
+                cross(*ready)
+                if on_progress is not None:
+                    on_progress(min(LANES, gains.shape[0] - row * LANES))
+                return ready[-1]
+
+            outcomes += pool.map(one_row, rows)
+            too_fast.append(of_block)
+    return _gathered(outcomes, gains.shape[0], system, batch.timing, np.concatenate(too_fast))
+
+
+BLOCK = 16
+"""Rows of samples whose own trains are made at once [-]; assumed: tables of some megabytes."""
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Samples to run: a system, their gains and values, their tracks, and what all share."""
+
+    system: System
+    gains: FloatArray
+    values: Mapping[str, FloatArray]
+    profile_of: Callable[[int], Profile] | None
+    laws: tuple[Law, Law]
+    timing: Timing
+    footprints: tuple[Footprints, Footprints]
+    grounds: tuple[packing.Ground, packing.Ground]
+
+    def samples(self, rows: range) -> IntArray:
+        """Numbers of the samples in rows; the last stands wherever a row is not full."""
+        numbers = np.arange(rows.start * LANES, rows.stop * LANES)
+        return np.minimum(numbers, self.gains.shape[0] - 1)
+
+
+def _batch(
+    system: System,
+    gains: FloatArray,
+    values: Mapping[str, FloatArray],
+    profile_of: Callable[[int], Profile] | None,
+    record_every: int,
+) -> _Batch:
+    """What all samples share."""
+    config, kinds = system.config, (system.suspension, system.guidance)
+    timing = packing.timing(config, record_every)
+    circuits = (config.control.suspension, config.control.guidance)
+    laws = [
+        packing.law(circuit, rows, timing.time_step, gains)
+        for circuit, rows in zip(circuits, kinds, strict=True)
+    ]
+    grounds = system.grounds
+    footprints = (system.suspension_footprints, system.guidance_footprints)
+    if values:  # each sample's sag is its own: the shared track is the irregularity alone
+        suspension, guidance = (
+            replace(one, sag=0.0 * one.sag, sag_slope=0.0 * one.sag_slope) for one in grounds
         )
+        grounds = (suspension, guidance)
+        footprints = _on_tracks(footprints, packing.tracks(config, grounds, [system.profile]))
+    return _Batch(
+        system, gains, values, profile_of, (laws[0], laws[1]), timing, footprints, grounds
     )
 
-    def one_row(row: int) -> Outcome:
-        outcome = packing.empty_outcome(system.train, kinds, run)
-        lanes = np.ascontiguousarray(padded[row * LANES : (row + 1) * LANES].T)
-        suspension_places, guidance_places = system.suspension_places, system.guidance_places
-        if profile_of is not None:
-            numbers = np.minimum(np.arange(row * LANES, (row + 1) * LANES), n_samples - 1)
-            profiles = {int(k): profile_of(int(k)) for k in np.unique(numbers)}
-            for profile in profiles.values():
-                _check_reach(config, profile)
-            of_kinds = packing.tracks(config, system.grounds, [profiles[int(k)] for k in numbers])
-            suspension_places, guidance_places = (
-                places._replace(rail=rail, ramp=ramp)
-                for places, (rail, ramp) in zip(
-                    (suspension_places, guidance_places), of_kinds, strict=True
-                )
-            )
-        passage(
-            system.vehicle,
-            system.suspension,
-            system.guidance,
-            suspension_law,
-            guidance_law,
-            suspension_places,
-            guidance_places,
-            system.spans,
-            run,
-            lanes,
-            outcome,
-        )
-        if on_progress is not None:
-            on_progress(min(LANES, n_samples - row * LANES))
-        return outcome
 
-    with ThreadPoolExecutor(max_workers=n_threads) as pool:
-        outcomes = list(pool.map(one_row, range(n_rows)))
-    too_fast = samples_too_fast(system.parts, gains, run.time_step, system.safe_gains)
-    return _gathered(outcomes, n_samples, system, run, too_fast)
+def _on_tracks(
+    footprints: tuple[Footprints, Footprints], tracks: Sequence[tuple[FloatArray, FloatArray]]
+) -> tuple[Footprints, Footprints]:
+    """The footprints of both kinds with what the poles meet on other tracks."""
+    first, second = (
+        one._replace(rail=rail, ramp=ramp)
+        for one, (rail, ramp) in zip(footprints, tracks, strict=True)
+    )
+    return first, second
+
+
+def _block(batch: _Batch, rows: range) -> tuple[Callable[[int], tuple], BoolArray]:
+    """Arguments of the kernel of each row by its number, and whose step is too large."""
+    system, timing = batch.system, batch.timing
+    numbers = batch.samples(rows)
+    gains = batch.gains[numbers]
+    n = min(rows.stop * LANES, batch.gains.shape[0]) - rows.start * LANES
+    if not batch.values:
+        too_fast = samples_too_fast(system.parts, gains[:n], timing.time_step, system.safe_gains)
+        return lambda row: _shared_arguments(batch, row), too_fast
+    values = {key: of_all[numbers] for key, of_all in batch.values.items()}
+    kinds = (system.suspension, system.guidance)
+    own = own_train(system.config, system.train, kinds, values, numbers.size)
+    too_fast = trains_too_fast(system.config, system.headroom, own.rates, gains, values)[:n]
+    return lambda row: _own_arguments(batch, own, row, rows.start), too_fast
+
+
+def _shared_arguments(batch: _Batch, row: int) -> tuple:
+    """Arguments of the kernel for a row of samples that share a train."""
+    system = batch.system
+    kinds = (system.suspension, system.guidance)
+    return (
+        system.vehicle,
+        *kinds,
+        *batch.laws,
+        *_tracks_of_row(batch, row),
+        system.spans,
+        batch.timing,
+        np.ascontiguousarray(batch.gains[batch.samples(range(row, row + 1))].T),
+        packing.empty_outcome(system.train, kinds, batch.timing),
+    )
+
+
+def _own_arguments(batch: _Batch, own: OwnTrain, row: int, first: int) -> tuple:
+    """Arguments of the kernel for a row of samples that have each a train of its own."""
+    system, config = batch.system, batch.system.config
+    samples = slice((row - first) * LANES, (row - first + 1) * LANES)
+    kinds = (own.kinds[0].row(samples), own.kinds[1].row(samples))
+    timing = own_timing(batch.timing, own, samples)
+    circuits = (config.control.suspension, config.control.guidance)
+    laws = [
+        own_law(law, lag[samples], circuit.delay, timing.time_step)
+        for law, lag, circuit in zip(batch.laws, own.lag, circuits, strict=True)
+    ]
+    footprints = [
+        own_footprints(one, ground, level[samples], sagging[samples], config.passage.speed)
+        for one, ground, level, sagging in zip(
+            _tracks_of_row(batch, row), system.grounds, own.level, own.sagging, strict=True
+        )
+    ]
+    return (
+        own.vehicle.row(samples),
+        *kinds,
+        *laws,
+        *footprints,
+        system.spans,
+        timing,
+        np.ascontiguousarray(batch.gains[batch.samples(range(row, row + 1))].T),
+        packing.empty_outcome(system.train, kinds, timing),
+    )
+
+
+def _tracks_of_row(batch: _Batch, row: int) -> tuple[Footprints, Footprints]:
+    """The footprints of both kinds on the track, or the tracks, of a row of samples."""
+    if batch.profile_of is None:
+        return batch.footprints
+    numbers = batch.samples(range(row, row + 1))
+    profiles = {int(k): batch.profile_of(int(k)) for k in np.unique(numbers)}
+    config = batch.system.config
+    for profile in profiles.values():
+        _check_reach(config, profile)
+    of_kinds = packing.tracks(config, batch.grounds, [profiles[int(k)] for k in numbers])
+    return _on_tracks(batch.footprints, of_kinds)
 
 
 def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ...]) -> None:
@@ -231,7 +351,7 @@ def _mean_gains(config: Config) -> FloatArray:
 
 
 def _check_reach(config: Config, profile: Profile) -> None:
-    """Refuse a profile that is shorter than the run."""
+    """Refuse a profile that does not cover the passage."""
     start, stop = track_range(config)
     grid_stop = profile.x0 + profile.dx * (profile.values.shape[1] - 1)
     if profile.x0 > start or grid_stop < stop:
@@ -245,7 +365,7 @@ def _gathered(
     outcomes: list[Outcome],
     n_samples: int,
     system: System,
-    run: Run,
+    timing: Timing,
     too_fast: BoolArray,
 ) -> Passages:
     n_cars = system.vehicle.body_z.size
@@ -264,10 +384,10 @@ def _gathered(
     # A lost sample goes on in its row as long as others hold; what it does then means nothing.
     lost_time, is_lost = samples_first("lost_time"), samples_first("lost_magnet") >= 0
     number = np.arange(1.0, outcomes[0].history.shape[0] + 1)
-    time = number * (run.record_every * run.time_step)
+    time = number * (timing.record_every * timing.time_step)
     history = np.moveaxis(samples_first("history"), 1, 2).copy()
     for sample in np.flatnonzero(is_lost):
-        history[sample, :, time >= lost_time[sample] - 0.5 * run.time_step] = np.nan
+        history[sample, :, time >= lost_time[sample] - 0.5 * timing.time_step] = np.nan
     kept = ("gap_min", "gap_max", "current_max")  # in the order of `Outcome.at_loss`
     bounds = np.concatenate([samples_first(name) for name in kept], axis=1)
     bounds = np.where(is_lost[:, None], samples_first("at_loss"), bounds)

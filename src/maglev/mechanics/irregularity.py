@@ -172,7 +172,7 @@ def displacement(profile: Profile, x: npt.ArrayLike) -> tuple[FloatArray, FloatA
     n = profile.values.shape[1]
     if not np.all((position >= 0) & (position <= n - 1)):
         raise UserError(
-            f"places must lie in the profile's range {profile.x0:g} to "
+            f"x must lie in the profile's range {profile.x0:g} to "
             f"{profile.x0 + (n - 1) * profile.dx:g} m, got {np.min(x):g} to {np.max(x):g} m"
         )
     cell = np.minimum(position.astype(int), n - 2)
@@ -389,7 +389,7 @@ def _splined(
     """Cubic spline through a measured profile; beyond its ends it keeps its last value."""
     if measured.x[0] > start or measured.x[-1] < end:
         raise UserError(
-            f"{measured.source} must cover the run from {start:g} to {end:g} m, "
+            f"{measured.source} must cover the passage from {start:g} to {end:g} m, "
             f"got {measured.x[0]:g} to {measured.x[-1]:g} m"
         )
     spline = CubicSpline(measured.x, measured.displacement, axis=1)

@@ -14,11 +14,11 @@ import numpy as np
 
 from maglev.arrays import FloatArray, IntArray
 from maglev.mechanics import trains as trains_model
-from maglev.mechanics._records import Law, MagnetRows, Places, Run, Vehicle
+from maglev.mechanics._records import Footprints, Law, MagnetRows, Timing, Vehicle
 from maglev.mechanics.control import late_current
-from maglev.mechanics.packing import Ground
+from maglev.mechanics.packing import Ground, mean_pole_force
 from maglev.mechanics.train import TrainModel
-from maglev.mechanics.trains import Trains
+from maglev.mechanics.trains import Rates, Trains
 from maglev.mechanics.varied import LEVELS, with_arrays
 from maglev.parameters import Config, Magnet
 
@@ -66,8 +66,6 @@ class OwnTrain:
 
     Attributes
     ----------
-    trains
-        Their bodies and links.
     kinds
         Suspension and guidance magnets.
     vehicle
@@ -76,17 +74,20 @@ class OwnTrain:
         Of the circuits [s].
     gap_contact, gap_lost : (sample,)
         [m].
-    level : (kind, sample)
-        Factor on the irregularity that magnets of a kind meet [-].
+    level, sagging : (kind, sample)
+        Factors on the irregularity and on the standing sag that magnets of a kind meet [-].
+    rates
+        What the time step has to follow.
     """
 
-    trains: Trains
     kinds: tuple[OwnMagnets, OwnMagnets]
     vehicle: OwnVehicle
     lag: FloatArray
     gap_contact: FloatArray
     gap_lost: FloatArray
     level: FloatArray
+    sagging: FloatArray
+    rates: Rates
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ class OwnMagnets:
     current_reference: FloatArray
     mass: FloatArray
     inertia: FloatArray
-    mean_force: FloatArray
+    sagging: FloatArray
 
     def row(self, samples: slice) -> MagnetRows:
         """Record of one row of samples."""
@@ -179,17 +180,19 @@ def own_train(
     def each(number: float | FloatArray) -> FloatArray:
         return np.broadcast_to(np.asarray(number, dtype=float), (n_samples,))
 
+    suspension, guidance = (
+        _magnets(magnet, rows, trains, n_samples)
+        for magnet, rows in zip(magnets, kinds, strict=True)
+    )
     return OwnTrain(
-        trains=trains,
-        kinds=(
-            _magnets(magnets[0], kinds[0], trains, n_samples),
-            _magnets(magnets[1], kinds[1], trains, n_samples),
-        ),
+        kinds=(suspension, guidance),
         vehicle=_vehicle(train, trains),
         lag=np.stack([each(own.control.suspension.lag), each(own.control.guidance.lag)]),
         gap_contact=each(own.passage.gap_contact),
         gap_lost=each(own.passage.gap_lost),
         level=np.stack([each(one) for one in _levels(config, values)]),
+        sagging=np.stack([suspension.sagging, guidance.sagging]),
+        rates=trains_model.rates(trains, own.train, train.magnets),
     )
 
 
@@ -199,9 +202,7 @@ def _levels(config: Config, values: Mapping[str, FloatArray]) -> list[float | Fl
     for direction in ("vertical", "lateral"):
         keys = [f"irregularity.{direction}.{name}" for name in LEVELS]
         given = [key for key in keys if key in values]
-        found.append(
-            np.sqrt(values[given[0]] / config.number_at(given[0])[0]) if given else 1.0
-        )
+        found.append(np.sqrt(values[given[0]] / config.number_at(given[0])[0]) if given else 1.0)
     return found
 
 
@@ -267,7 +268,7 @@ def _magnets(magnet: Magnet, rows: MagnetRows, trains: Trains, n_samples: int) -
         current_reference=current,
         mass=each(magnet.mass),
         inertia=each(magnet.inertia),
-        mean_force=rest.reshape(n_samples, -1).mean(axis=1),
+        sagging=rest.reshape(n_samples, -1).mean(axis=1) / mean_pole_force(rows),
     )
 
 
@@ -282,14 +283,14 @@ def own_law(law: Law, lag: FloatArray, delay: float, time_step: float) -> Law:
     )
 
 
-def own_places(
-    places: Places, ground: Ground, level: FloatArray, sagging: FloatArray, speed: float
-) -> Places:
+def own_footprints(
+    footprints: Footprints, ground: Ground, level: FloatArray, sagging: FloatArray, speed: float
+) -> Footprints:
     """What poles of a kind meet, with the level and the sag that each sample (LANES,) has.
 
-    ``places`` hold the irregularity alone.
+    ``footprints`` hold the irregularity alone.
     """
-    return places._replace(
+    return footprints._replace(
         level=aligned(level[None]),
         sag=np.ascontiguousarray(ground.sag).ravel(),
         sag_rise=np.ascontiguousarray(ground.sag_slope * speed).ravel(),
@@ -297,8 +298,8 @@ def own_places(
     )
 
 
-def own_run(run: Run, train: OwnTrain, samples: slice) -> Run:
+def own_timing(timing: Timing, train: OwnTrain, samples: slice) -> Timing:
     """The passage with the bounds on the gap that each sample of a row has of its own."""
-    return run._replace(
+    return timing._replace(
         gap_contact=aligned(train.gap_contact[samples]), gap_lost=aligned(train.gap_lost[samples])
     )

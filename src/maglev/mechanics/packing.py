@@ -1,4 +1,4 @@
-"""Arrays for the kernels: train, magnets, circuits, places and guideway."""
+"""Arrays for the kernels: train, magnets, circuits, footprints and guideway."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics._records import (
+    Footprints,
     Law,
     MagnetRows,
     Outcome,
-    Places,
-    Run,
     Spans,
     Stretches,
+    Timing,
     Vehicle,
 )
 from maglev.mechanics.activity import Stretch, stepped_mass, stretches, top_stiffness
@@ -30,7 +30,6 @@ from maglev.mechanics.reduction import ReducedGuideway, face_weights, standing_s
 from maglev.mechanics.responses import acceleration_filter
 from maglev.mechanics.step_limit import step_response
 from maglev.parameters import Circuit, Config, Guideway, Magnet
-
 
 _SHARED = np.zeros(0, dtype=np.int64)
 """Numbers of rows where all samples share one number."""
@@ -185,12 +184,12 @@ def _stride(guideway: Guideway) -> int:
     return rail.units_per_span * 2 * (rail.connectors_per_unit + 2)
 
 
-def places(
+def footprints(
     config: Config,
     rows: MagnetRows,
     guideway: guideway_model.GuidewayModel,
     reduced: ReducedGuideway,
-) -> tuple[Places, Ground]:
+) -> tuple[Footprints, Ground]:
     """Tabulate rails and sag under the poles after whole numbers of steps; no track yet."""
     way = course(config)
     begins = (rows.x[:, None] + rows.offset + way.start) / way.advance
@@ -208,7 +207,7 @@ def places(
     sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x, way.advance)
     apart = np.array([1.0, -1.0 if rows.is_guidance else 1.0])
     nothing = np.zeros((x.size, 2, 1))
-    tabulated = Places(
+    tabulated = Footprints(
         number=number,
         first=faces.first,
         start=faces.start,
@@ -216,6 +215,10 @@ def places(
         rise=faces.slope * config.passage.speed,
         rail=nothing,
         ramp=nothing,
+        level=1.0,
+        sag=np.zeros(2 * x.size),
+        sag_rise=np.zeros(2 * x.size),
+        sagging=1.0,
     )
     ground = Ground(
         x=x,
@@ -248,6 +251,11 @@ def tracks(
     return met
 
 
+def mean_pole_force(rows: MagnetRows) -> float:
+    """Force of a pole at rest, mean over those of a kind [N]."""
+    return float(rows.constant.mean() * np.square(rows.current_reference / rows.gap_reference))
+
+
 def _standing_sag(
     config: Config,
     rows: MagnetRows,
@@ -262,11 +270,11 @@ def _standing_sag(
     """
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
     magnet = _magnet(config, rows)
-    force = float(rows.constant.mean()) * (rows.current_reference / rows.gap_reference) ** 2
+    force = mean_pole_force(rows)
     sag, slope = np.zeros_like(x), np.zeros_like(x)
     for span in range(n_spans):
         inside = np.flatnonzero((x >= span * length) & (x < (span + 1) * length))
-        places, of_span, its_slope = standing_sag(
+        along, of_span, its_slope = standing_sag(
             guideway,
             reduced,
             span,
@@ -276,12 +284,12 @@ def _standing_sag(
             pole_length=magnet.pole_length,
         )
         at = x[inside] - span * length
-        sag[inside] = np.interp(at, places, of_span)
+        sag[inside] = np.interp(at, along, of_span)
         if magnet.pole_length == 0:
-            slope[inside] = np.interp(at, places, its_slope)
+            slope[inside] = np.interp(at, along, its_slope)
             continue
         ends = [np.clip(at + part * advance, 0.0, length) for part in (-0.5, 0.5)]
-        rise = np.subtract(*(np.interp(end, places, of_span) for end in ends[::-1]))
+        rise = np.subtract(*(np.interp(end, along, of_span) for end in ends[::-1]))
         slope[inside] = rise / (ends[1] - ends[0])
     return sag, slope
 
@@ -454,10 +462,10 @@ def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, FloatArray]:
     return rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data
 
 
-def run(config: Config, record_every: int) -> Run:
+def timing(config: Config, record_every: int) -> Timing:
     passage = config.passage
     way = course(config)
-    return Run(
+    return Timing(
         first_step=way.first_step,
         n_steps=way.n_steps,
         time_step=way.time_step,
@@ -472,15 +480,20 @@ def run(config: Config, record_every: int) -> Run:
 
 
 def empty_outcome(
-    train: train_model.TrainModel, kinds: tuple[MagnetRows, MagnetRows], run: Run
+    train: train_model.TrainModel, kinds: tuple[MagnetRows, MagnetRows], timing: Timing
 ) -> Outcome:
     """Empty results of a row of samples, as for a train at rest."""
     n_cars = train.parameters.n_cars
     table = train.magnets
     n_magnets = table.x.size
-    n_records = run.n_steps // run.record_every if run.record_every else 0
-    gap = np.array([[k.gap_reference] * LANES for k in kinds])
-    current = np.array([[k.current_reference] * LANES for k in kinds])
+    n_records = timing.n_steps // timing.record_every if timing.record_every else 0
+    gap, current = (
+        np.concatenate([np.broadcast_to(one, (1, LANES)) for one in of_kinds])
+        for of_kinds in (
+            [kind.gap_reference for kind in kinds],
+            [kind.current_reference for kind in kinds],
+        )
+    )
     history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets, LANES))
     of_kind = table.is_guidance.astype(np.int64)
     history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]

@@ -2,8 +2,8 @@
 
 Craig-Bampton with the interface shapes made mass-orthogonal to the component modes, so that the
 mass matrix is the identity on the modes and banded on the pier tops.  Every coordinate belongs to
-one span or one pier: no mode runs through the whole line, and cost grows with its length only where
-the train is.
+one span or one pier: no mode runs through the whole guideway, and cost grows with its length only
+where the train is.
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course
@@ -228,12 +229,12 @@ def _note(record: Record, step: int, every: int, of: System, at: Watch, state: S
 def _power(of: System, state: State) -> FloatArray:
     """Power of the magnets on train and guideway, and dissipated power [W], (3, sample)."""
     v_t, v_g = state.train.v, state.guideway.v
-    lost = of.train.dissipated(v_t) + of.guideway.dissipated(v_g)
+    dissipated = of.train.dissipated(v_t) + of.guideway.dissipated(v_g)
     on_train, on_guideway = (
         (state.on_train * v_t).sum(axis=0),
         (state.on_guideway * v_g).sum(axis=0),
     )
-    return np.stack([on_train, on_guideway, lost])
+    return np.stack([on_train, on_guideway, dissipated])
 
 
 def _stored(of: System, state: State) -> FloatArray:
@@ -375,9 +376,7 @@ def integrate(
     Raises
     ------
     UserError
-        If the gains have the wrong shape or are not finite.
-    RuntimeError
-        If a step does not converge.
+        If the gains have the wrong shape or are not finite, or if a step does not converge.
 
     References
     ----------
@@ -448,7 +447,7 @@ def solve(
     Parameters
     ----------
     config
-        Parameters of everything; ``passage.time_step`` only decides where the run starts.
+        Parameters of everything; ``passage.time_step`` only decides where the passage starts.
     profile
         Track irregularity.
     gains : (sample, 4) or (sample, 8)
@@ -470,9 +469,8 @@ def solve(
     Raises
     ------
     UserError
-        If the gains have the wrong shape or are not finite.
-    RuntimeError
-        If a step does not converge, or if the error is above the tolerance with the shortest step.
+        If the gains have the wrong shape or are not finite, a step does not converge, or the error
+        exceeds the tolerance even with the shortest step.
 
     References
     ----------
@@ -498,7 +496,7 @@ def solve(
         if not (error > tolerance).any() and (before is not None or have_faces):
             return passages_of(better, rows), effort
         coarse, before = fine, six_extremes(better)
-    raise RuntimeError(
+    raise UserError(
         f"reference: expected errors of at most {100 * tolerance:g} %, got {_told(effort)}; "
         "raw accelerations may have no limit: give passage.acceleration_band"
     )
@@ -512,8 +510,8 @@ def extrapolated(coarse: Record, fine: Record) -> Record:
         correction = (other[1::2] - one) / 3
         return other + CubicSpline(coarse.time, correction)(fine.time)
 
-    lost = np.where(coarse.fate.status != 0, coarse.fate.status, fine.fate.status)
-    fate = replace(fine.fate, status=lost) if (lost != fine.fate.status).any() else fine.fate
+    status = np.where(coarse.fate.status != 0, coarse.fate.status, fine.fate.status)
+    fate = replace(fine.fate, status=status) if (status != fine.fate.status).any() else fine.fate
     changed = {name: better(name) for name in ("girder", "body_z", "body_y")}
     return replace(fine, fate=fate, **changed)
 

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
 from maglev.arrays import BoolArray, FloatArray
+from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course
@@ -107,11 +108,11 @@ class Structure:
         return a
 
     def dissipated(self, v: FloatArray) -> FloatArray:
-        """Power lost to damping (sample,) [W]."""
-        lost = (v * (self.damping @ v)).sum(axis=0)
+        """Power dissipated by damping (sample,) [W]."""
+        power = (v * (self.damping @ v)).sum(axis=0)
         if self.coefficient.size:
-            lost += (self.coefficient * (self.modes @ v) ** 2).sum(axis=0)
-        return lost
+            power += (self.coefficient * (self.modes @ v) ** 2).sum(axis=0)
+        return power
 
     def predicted(self, before: Motion) -> Motion:
         """Predictor: the motion a step later without its acceleration."""
@@ -304,8 +305,8 @@ def stepped(of: System, state: State, view: View, running: BoolArray) -> State:
 
     Raises
     ------
-    RuntimeError
-        If the forces do not stay.
+    UserError
+        If the pole forces do not converge.
     """
     train, guideway = of.train.predicted(state.train), of.guideway.predicted(state.guideway)
     inner_train = of.train.inner(train)
@@ -333,9 +334,9 @@ def stepped(of: System, state: State, view: View, running: BoolArray) -> State:
         if iteration % FRESH_TANGENT_EVERY == 0:
             tangents = [closed_train(of, magnets, k) for k in range(of.n_samples)]
     else:
-        raise RuntimeError(
-            f"the pole forces did not converge within {MOST_ITERATIONS} iterations at "
-            f"t = {view.time:.4f} s; take a smaller passage.time_step"
+        raise UserError(
+            f"reference: the pole forces must converge in {MOST_ITERATIONS} iterations a step, and "
+            f"did not at t = {view.time:.4f} s; take a smaller step or the production solver"
         )
     charge.signals.append(signal)
     return State(now_t, now_g, charge, magnets, on_train, on_guideway, before, state.tangents)

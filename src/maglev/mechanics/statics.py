@@ -35,21 +35,21 @@ def deflection(guideway: GuidewayModel, train: TrainModel, nose: npt.ArrayLike) 
     deflection : (...)
         Downwards [m].
     """
-    places = np.asarray(nose, dtype=float)
+    nose = np.asarray(nose, dtype=float)
     midspan, _ = guideway.girder_rows([midspan_of_middle_span(guideway)])
     influence = splu(guideway.stiffness.tocsc()).solve(midspan.toarray()[0])
     magnets = train.magnets
     force = pole_static_force(train.parameters, magnets)
     offsets = pole_offsets(train.parameters.suspension_magnet)
-    total = np.zeros(places.size)
+    total = np.zeros(nose.size)
     for side in np.unique(magnets.side):
         hung = ~magnets.is_guidance & (magnets.side == side)
         pole_x = (magnets.x[hung, None] + offsets).ravel()
         pole_force = force[hung, : offsets.size].ravel()
-        at = places.reshape(-1, 1) + pole_x
+        at = nose.reshape(-1, 1) + pole_x
         u_z, _, _, _ = guideway.rail_rows(at.ravel(), int(side))
         total += (u_z @ influence).reshape(at.shape) @ pole_force
-    return total.reshape(places.shape)
+    return total.reshape(nose.shape)
 
 
 def largest_deflection(guideway: GuidewayModel, train: TrainModel, step: float = 0.5) -> float:

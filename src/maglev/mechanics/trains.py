@@ -15,8 +15,8 @@ from scipy.sparse.csgraph import connected_components
 
 from maglev.arrays import FloatArray, IntArray
 from maglev.mechanics import train as train_model
-from maglev.mechanics.train import MagnetTable
-from maglev.parameters import Train
+from maglev.mechanics.train import MagnetTable, TrainModel
+from maglev.parameters import Magnet, Train
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,56 @@ class Trains:
     def on_the_diagonal(self, of_link: FloatArray) -> FloatArray:
         """Diagonal (sample, dof) of the matrix with these coefficients (sample, link)."""
         return _summed(self.dof, self.coefficient**2 * of_link[:, self.link], self.mass.shape[1])
+
+
+@dataclass(frozen=True)
+class Rates:
+    """What a time step has to follow of trains with open magnets.
+
+    Attributes
+    ----------
+    stiffness, damping : (sample, dof)
+        On the diagonal, over the mass [1/s², 1/s].
+    pull : kind of (sample, 2 pole)
+        Force of each pole at rest over current at rest, and over the magnet's mass [m/(s² A)],
+        then over its inertia [1/(kg m s² A)].
+    """
+
+    stiffness: FloatArray
+    damping: FloatArray
+    pull: tuple[FloatArray, FloatArray]
+
+
+def own_rates(train: TrainModel) -> Rates:
+    """Rates of one train (1, ...)."""
+    return rates(build(train.parameters, train.magnets, 1), train.parameters, train.magnets)
+
+
+def rates(trains: Trains, train: Train, magnets: MagnetTable) -> Rates:
+    """Rates of trains.
+
+    Parameters
+    ----------
+    trains, train, magnets
+        As `build` gives and takes them.
+    """
+
+    def pull(kind: Magnet, *, guidance: bool) -> FloatArray:
+        poles = trains.pole_force[:, magnets.is_guidance == guidance, : kind.n_poles]
+        per_current = poles.reshape(poles.shape[0], -1) / np.reshape(
+            kind.current_reference, (-1, 1)
+        )
+        inertias = (np.reshape(one, (-1, 1)) for one in (kind.mass, kind.inertia))
+        return np.concatenate([per_current / one for one in inertias], axis=1)
+
+    return Rates(
+        stiffness=trains.on_the_diagonal(trains.stiffness) / trains.mass,
+        damping=trains.on_the_diagonal(trains.damping) / trains.mass,
+        pull=(
+            pull(train.suspension_magnet, guidance=False),
+            pull(train.guidance_magnet, guidance=True),
+        ),
+    )
 
 
 def build(train: Train, magnets: MagnetTable, n_samples: int) -> Trains:

@@ -27,7 +27,7 @@ from maglev.vocabulary import BASELINE, DENSITY_METHODS, DESIGNED, RESPONSES
 _LOG = logging.getLogger(__name__)
 
 N_BODY, N_TAIL = 801, 200
-"""Places at which a density is given: evenly over its body, and ever wider apart in its tail."""
+"""Values at which a density is given: evenly over its body, and ever wider apart in its tail."""
 
 REACH = 4.0
 """Bandwidths beyond the smallest and the largest value at which a density is still given; a
@@ -198,8 +198,8 @@ def of_surrogate(
     return result
 
 
-def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> FloatArray:
-    """Places (place,) of a density: dense around its body, sparse towards strays.
+def grid(values: FloatArray, probability: FloatArray, bandwidth: float) -> FloatArray:
+    """Values (cell,) at which a density is given: dense around its body, sparse towards strays.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> Flo
 def _column(values: FloatArray, probability: FloatArray, lost_probability: float) -> dict:
     """Variables of one response with a direct density."""
     bandwidth = silverman_bandwidth(values, probability)
-    at = places(values, probability, bandwidth)
+    at = grid(values, probability, bandwidth)
     sample = (at, values, probability)
     direct = direct_density(*sample, bandwidth=bandwidth, lost_probability=lost_probability)
     mean = probability @ values

@@ -65,7 +65,7 @@ def dataset(config: Config) -> xr.Dataset:
     Raises
     ------
     UserError
-        If a measured profile cannot be read or is shorter than the run.
+        If a measured profile cannot be read or does not cover the passage.
     """
     irregularity = config.irregularity
     end = config.guideway.length + config.train.length

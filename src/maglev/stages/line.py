@@ -28,7 +28,7 @@ N_POINTS = 2**15
 1e-3, and the intervals count their sampling."""
 
 N_CELLS = 1001
-"""Places at which densities are given; assumed: a few in the kernel of the narrowest track."""
+"""Values at which densities are given; assumed: a few in the kernel of the narrowest track."""
 
 REACH = 4.0
 """Bandwidths of the widest track beyond the smallest and the largest value."""
@@ -139,7 +139,7 @@ _DIMS = {
 
 
 def _densities(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Places (cell,) and the density (track, cell) on each track, of values (track, sample)."""
+    """Values (cell,) and the density (track, cell) on each track, of values (track, sample)."""
     width = [silverman_bandwidth(one) for one in values]
     reach = REACH * max(width)
     at = np.linspace(values.min() - reach, values.max() + reach, N_CELLS)

@@ -146,15 +146,15 @@ def stored_runs(
             f"track_seeds have shape {seeds.shape}, expected (sample,) = ({gains.shape[0]},)"
         )
     folder, keys = folder_of(config, store), _row_keys(gains, seeds)
-    places = _stored(folder)
-    missing = list({key: row for row, key in enumerate(keys) if key not in places}.values())
+    found = _stored(folder)
+    missing = list({key: row for row, key in enumerate(keys) if key not in found}.values())
     began = time.perf_counter()
     for start in range(0, len(missing), BATCH):
         rows = np.array(missing[start : start + BATCH])
         path = _compute(
             config, gains[rows], None if seeds is None else seeds[rows], folder, n_threads
         )
-        places |= {keys[row]: (path, place) for place, row in enumerate(rows)}
+        found |= {keys[row]: (path, index) for index, row in enumerate(rows)}
         done = min(start + BATCH, len(missing))
         rate = done / (time.perf_counter() - began)
         _LOG.info(
@@ -167,7 +167,7 @@ def stored_runs(
         )
     if not missing:
         _LOG.info("%d runs found, none to do", len(keys))
-    return _gathered([places[key] for key in keys])
+    return _gathered([found[key] for key in keys])
 
 
 def _compute(
@@ -203,9 +203,9 @@ def _refuse_too_large_steps(gains: FloatArray, computed: xr.Dataset) -> None:
         )
 
 
-def _gathered(places: Sequence[tuple[Path, int]]) -> xr.Dataset:
-    """Runs at their places in the store, in order."""
-    files = {path: number for number, path in enumerate(dict.fromkeys(path for path, _ in places))}
+def _gathered(rows: Sequence[tuple[Path, int]]) -> xr.Dataset:
+    """Runs at given rows of files of the store, in order."""
+    files = {path: number for number, path in enumerate(dict.fromkeys(path for path, _ in rows))}
     with _FILES:
         parts = [datasets.read(path, "passage") for path in files]
     offset = np.cumsum([0, *(part.sizes["sample"] for part in parts)])
@@ -217,9 +217,9 @@ def _gathered(places: Sequence[tuple[Path, int]]) -> xr.Dataset:
         compat="override",
         combine_attrs="override",
     )
-    chosen = whole.isel(sample=[offset[files[path]] + row for path, row in places])
+    chosen = whole.isel(sample=[offset[files[path]] + row for path, row in rows])
     chosen.attrs = datasets.carried(parts[0])
-    return chosen.assign_coords(sample=np.arange(len(places)))
+    return chosen.assign_coords(sample=np.arange(len(rows)))
 
 
 def runs(

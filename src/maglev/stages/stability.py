@@ -29,7 +29,7 @@ N_STEPS = 12
 """Steps of the search for a border in the map, each a tenth of the mean or less."""
 
 PROPORTIONAL, DERIVATIVE = 0, 1
-"""Places of the suspension's k_p and k_d among the gains."""
+"""Columns of the suspension's k_p and k_d among the gains."""
 
 
 def dataset(config: Config) -> xr.Dataset:

@@ -24,7 +24,7 @@ from maglev.stages.reads import MEASURED
 _LOG = logging.getLogger(__name__)
 
 N_POINTS = 201
-"""Places of the curve; assumed."""
+"""Points of the curve; assumed."""
 
 RANGE = (0.7, 1.6)
 """Its ends over the frequency of the model; assumed."""

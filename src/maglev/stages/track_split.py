@@ -12,7 +12,7 @@ from maglev.arrays import FloatArray
 from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.density import places
+from maglev.stages.density import grid
 from maglev.stages.extremes import coordinates, extremes, lost
 from maglev.stages.randomness import generator_of_statistics
 from maglev.uncertainty.gdee import direct_density, silverman_bandwidth
@@ -71,7 +71,7 @@ def dataset(
         held = {key: held_part(values[key][:, response], lost(part)) for key, part in sets.items()}
         together = np.concatenate([one.values for one in held.values()])
         widest = max(silverman_bandwidth(one.values) for one in held.values())
-        at = places(together, np.full(together.size, 1 / together.size), widest)
+        at = grid(together, np.full(together.size, 1 / together.size), widest)
         rows.append(
             {
                 "value": at,

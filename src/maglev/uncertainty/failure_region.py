@@ -334,15 +334,15 @@ def border_batch(
     outcome = outcome - outcome.mean(axis=1, keepdims=True)
     chosen = np.empty(n_new, dtype=np.int64)
     free = np.ones(pool.size, dtype=bool)
-    for place in range(n_new):
+    for k in range(n_new):
         square = np.einsum("cd,cd->c", outcome, outcome)
         known = square <= SETTLED * outcome.shape[1]
         gain = np.where(known, 0.0, (outcome @ total) ** 2 / np.where(known, 1.0, square))
         best = int(np.argmax(np.where(free, gain, -1.0)))
         free[best] = False
-        chosen[place] = pool[best]
+        chosen[k] = pool[best]
         if scores is not None:
-            scores[place] = gain[best] / total.size
+            scores[k] = gain[best] / total.size
         if not known[best]:
             explained = outcome[best] / np.sqrt(square[best])
             total = total - (total @ explained) * explained

@@ -289,7 +289,7 @@ def direct_density(
 
     Parameters
     ----------
-    at : (place,)
+    at : (value,)
         Where the density is wanted [unit of the value].
     values : (sample,)
         Extreme values of the held samples [their unit].
@@ -302,13 +302,13 @@ def direct_density(
 
     Returns
     -------
-    density : (place,)
+    density : (value,)
         Density of the held part [1/unit]; its integral is one less ``lost_probability``.
 
     Raises
     ------
     UserError
-        If the sample is faulty or constant, ``bandwidth`` is not positive, a place is not finite
+        If the sample is faulty or constant, ``bandwidth`` is not positive, a value is not finite
         or ``lost_probability`` lies outside [0, 1).
 
     References
@@ -326,7 +326,7 @@ def direct_density(
     check_lost_probability(lost_probability)
     at = np.asarray(at, dtype=float)
     if at.ndim != 1 or not np.all(np.isfinite(at)):
-        raise UserError(f"places must be finite and have shape (place,), got shape {at.shape}")
+        raise UserError(f"values must be finite and have shape (value,), got shape {at.shape}")
     mean, deviation = _moments(values, probability)
     if bandwidth is None:
         bandwidth = silverman_bandwidth(values, probability)
@@ -356,13 +356,13 @@ def direct_density_band(
 
     Parameters
     ----------
-    at : (place,)
+    at : (value,)
         Where the density is given [unit of the value].
     values : (sample,)
         Values that held [their unit].
     n
         Number of all runs.
-    density : (place,)
+    density : (value,)
         The direct density [1/unit].
     bandwidth
         Its kernel deviation h [unit].
@@ -373,7 +373,7 @@ def direct_density_band(
 
     Returns
     -------
-    low, high : (place,)
+    low, high : (value,)
         Ends of the band [1/unit]; the lower one is at least 0.
 
     References

@@ -191,12 +191,12 @@ def taylor_batch(
     remainder = taylor_remainder(surrogate, candidates)
     domain = _diameter(np.concatenate([occupied, candidates]))
     chosen = np.empty(n_new, dtype=np.int64)
-    for place in range(n_new):
+    for k in range(n_new):
         score = held * taylor_scores(distance, remainder, domain, aggregate)
         score[distance == 0.0] = -np.inf
-        best = chosen[place] = np.argmax(score)
+        best = chosen[k] = np.argmax(score)
         if scores is not None:
-            scores[place] = score[best]
+            scores[k] = score[best]
         remainder[best] = 0.0
         distance = np.minimum(distance, np.linalg.norm(candidates - candidates[best], axis=1))
     return chosen
@@ -352,7 +352,7 @@ def tail_batch(
     rows: list[list[FloatArray]] = [[] for _ in scale]
     free = np.ones(pool.size, dtype=bool)
     chosen = np.empty(n_new, dtype=np.int64)
-    for place in range(n_new):
+    for k in range(n_new):
         gains = np.empty((len(joint), pool.size))
         for target, (response, between) in enumerate(joint):
             known = variance[response] <= SETTLED * scale[response] ** 2
@@ -362,9 +362,9 @@ def tail_batch(
         gain = np.where(free, held[pool] * gain, -np.inf)
         best = int(np.argmax(gain))
         free[best] = False
-        chosen[place] = pool[best]
+        chosen[k] = pool[best]
         if scores is not None:
-            scores[place] = gain[best]
+            scores[k] = gain[best]
         for response, spread in enumerate(scale):
             if variance[response, best] <= SETTLED * spread**2:
                 continue

@@ -98,7 +98,7 @@ def exceedance(
 
     Parameters
     ----------
-    at : (place,)
+    at : (value,)
         Values y [unit of the extreme value].
     values : (sample,)
         Extreme values of the held samples [their unit].
@@ -109,13 +109,13 @@ def exceedance(
 
     Returns
     -------
-    exceedance : (place,)
+    exceedance : (value,)
         P(Y > y or lost) [-].
 
     Raises
     ------
     UserError
-        If the sample is faulty, a place is NaN or ``lost_probability`` lies outside [0, 1).
+        If the sample is faulty, a value y is NaN or ``lost_probability`` lies outside [0, 1).
 
     References
     ----------
@@ -128,7 +128,7 @@ def exceedance(
     """
     values, probability = weighted_sample(values, probability)
     check_lost_probability(lost_probability)
-    at = _checked_places(at)
+    at = _checked_values(at)
     ordered, beyond = weight_beyond(values, probability)
     held = beyond[np.searchsorted(ordered, at, side="right")]
     return lost_probability + (1.0 - lost_probability) * held
@@ -322,10 +322,10 @@ def surrogate_limits(
     def end(shift: float | FloatArray, loss: float, side: int) -> FloatArray:
         level = (levels - loss) / (1.0 - loss)
         padded = np.concatenate(([-np.inf], np.sort(predictions + shift), [np.inf]))
-        place = np.full(levels.shape, n + 1)  # no finite end where losses alone exceed the level
+        rank = np.full(levels.shape, n + 1)  # no finite end where losses alone exceed the level
         finite = level > 0.0
-        place[finite] = _order_statistics(n, 1.0 - level[finite], confidence)[side]
-        return np.where(given, padded[place], np.nan)
+        rank[finite] = _order_statistics(n, 1.0 - level[finite], confidence)[side]
+        return np.where(given, padded[rank], np.nan)
 
     return Limits(
         failure_probability=levels,
@@ -443,7 +443,7 @@ def error_range_near(
 
     Parameters
     ----------
-    at : (place,)
+    at : (value,)
         Values near which the error is wanted, such as limits [unit of the value].
     values : (training,)
         Training values [unit].
@@ -454,7 +454,7 @@ def error_range_near(
 
     Returns
     -------
-    low, high : (place,)
+    low, high : (value,)
         Ends of the range [unit].
 
     Raises
@@ -475,7 +475,7 @@ def error_range_near(
     >>> bool(-0.01 <= low[0] < high[0] <= 0.01)
     True
     """
-    at = _checked_places(at)
+    at = _checked_values(at)
     values, residuals = np.asarray(values, dtype=float), np.asarray(residuals, dtype=float)
     _check_confidence(confidence)
     n = values.size
@@ -578,10 +578,10 @@ def _checked_levels(failure_probability: npt.ArrayLike) -> FloatArray:
     return levels
 
 
-def _checked_places(at: npt.ArrayLike) -> FloatArray:
+def _checked_values(at: npt.ArrayLike) -> FloatArray:
     at = np.atleast_1d(np.asarray(at, dtype=float))
     if at.ndim != 1 or np.any(np.isnan(at)):
-        raise UserError(f"places must have shape (place,) and not be NaN, got shape {at.shape}")
+        raise UserError(f"values y must have shape (value,) and not be NaN, got shape {at.shape}")
     return at
 
 

@@ -335,5 +335,5 @@ def weighted_quantile(
     """
     ordered, left = weight_beyond(np.asarray(values, float), np.asarray(weight, float))
     # left[k + 1] lies beyond the k-th smallest value and does not grow with k
-    place = np.searchsorted(-left[1:], -(np.asarray(beyond, float) + rounding), side="left")
-    return ordered[np.minimum(place, ordered.size - 1)]
+    index = np.searchsorted(-left[1:], -(np.asarray(beyond, float) + rounding), side="left")
+    return ordered[np.minimum(index, ordered.size - 1)]
