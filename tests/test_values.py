@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev.errors import UserError
+from maglev.mechanics.control import failing_magnets
 from maglev.parameters import Config, Parameters
 from maglev.simulation import cost_of, simulate
 from test_simulation import MEAN, small
@@ -90,11 +91,12 @@ def late():
     return Config.model_validate(config.quantities() | {"control": control, "cases": {}})
 
 
+FAILED = [f"control.{kind}.failed_magnets" for kind in ("suspension", "guidance")]
 KEYS = [
     key
     for section in ("train", "irregularity", "control", "passage")
     for key in numbers_of(getattr(late(), section), section)
-    if cost_of(late(), [key])[key] == "sample"
+    if key not in FAILED and cost_of(late(), [key])[key] == "sample"
 ]
 SPREAD = 0.25  # 2.5 deviations at a coefficient of variation of 0.1
 
@@ -159,3 +161,45 @@ def test_a_sample_of_its_own_does_not_know_its_neighbours():
     )
     for name in EXTREMES:
         assert_array_equal(together[name][few], alone[name])
+
+
+def test_failed_magnets_of_a_sample_are_those_of_a_system_built_anew():
+    config = small(2, 2)
+    failed = {FAILED[0]: np.array([0, 2, 0]), FAILED[1]: np.array([2, 0, 1])}
+    gains = MEAN * np.ones((3, 1))
+    together = simulate(config, gains, values=failed)
+    for sample in range(3):
+        numbers = {key: float(column[sample]) for key, column in failed.items()}
+        alone = simulate(config.with_numbers(numbers), gains[:1])
+        assert_array_equal(together["status"][sample], alone["status"][0])
+        for name in EXTREMES:
+            assert_allclose(together[name][sample], alone[name][0], rtol=1e-10)
+    assert np.ptp(together["guidance_gap_max"].values) > 1e-3
+
+
+def test_a_failed_magnet_has_no_current_and_its_gap_opens():
+    config = small().with_numbers({FAILED[1]: 1.0})
+    found = simulate(config, MEAN[None], histories=True)
+    guidance = np.flatnonzero(found["magnet_kind"].values == 1)
+    current, gap = (found[f"{name}_history"].values[0, guidance] for name in ("current", "gap"))
+    side, x = (found[f"magnet_{name}"].values[guidance] for name in ("side", "x"))
+    failed = failing_magnets(x, side)[0]
+    assert side[failed] == 1
+    assert np.all(current[failed] == 0.0)
+    assert np.all(np.delete(current, failed, axis=0) > 1.0)
+    assert gap[:, -1].argmax() == failed
+
+
+def test_more_failed_magnets_than_there_are_are_refused():
+    with pytest.raises(UserError, match="failed_magnets must be at most 14"):
+        simulate(small(), MEAN[None], values={FAILED[0]: np.array([15.0])})
+
+
+@pytest.mark.slow
+def test_the_reference_solver_agrees_about_failed_magnets():
+    config = small().with_numbers({FAILED[1]: 1.0})
+    production, reference = (
+        simulate(config, MEAN[None], solver=solver) for solver in ("production", "reference")
+    )
+    for name in EXTREMES:
+        assert_allclose(production[name], reference[name], rtol=0.02)

@@ -21,8 +21,8 @@ from maglev.mechanics._records import (
     Watch,
 )
 from maglev.mechanics._rows import (
+    add_terms,
     gather,
-    own_sum,
     project,
     transform,
     transform_both,
@@ -88,17 +88,19 @@ def _links(vehicle, train, scaled, pull):
         rate = load(train.predicted, i)
         damping = own_of(vehicle.scaled_damping, vehicle.damping_number, k)
         store(scaled, k, fma(rate, damping, along))
-    coefficient, start, number = vehicle.link_coefficient, vehicle.link_start, vehicle.link_number
+    coefficient, start = vehicle.link_coefficient, vehicle.link_start
     none = load(train.position, 0) * 0.0
     for i in range(start.size - 1):
         first, last = entry(start, i), entry(start, i + 1)
-        total = own_sum(coefficient, number, vehicle.link_scaled, first, last, scaled, none)
+        total = weighted_sum(coefficient, vehicle.link_scaled, first, last, scaled, none)
         store(pull, i, total)
-    coefficient, start, number = vehicle.pull_coefficient, vehicle.pull_start, vehicle.pull_number
+    add_terms(vehicle.own_link, 1.0, scaled, pull)
+    coefficient, start = vehicle.pull_coefficient, vehicle.pull_start
     for i in range(start.size - 1):
         first, last = entry(start, i), entry(start, i + 1)
-        total = own_sum(coefficient, number, vehicle.pull_link, first, last, pull, none)
+        total = weighted_sum(coefficient, vehicle.pull_link, first, last, pull, none)
         store(train.force, i, none - total)
+    add_terms(vehicle.own_pull, -1.0, pull, train.force)
 
 
 @kernel()

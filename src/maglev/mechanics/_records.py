@@ -15,6 +15,16 @@ COMPLETED, CONTACT, GAP_LOST, NOT_FINITE, STEP_TOO_LARGE = 0, 1, 2, 3, 4
 """How a passage ended: the values of ``status`` [-]."""
 
 
+class Terms(NamedTuple):
+    """Sums over few columns whose coefficients each sample has of its own, for some places only."""
+
+    place: np.ndarray  # (sum,) where the sum belongs
+    start: np.ndarray  # (sum + 1,)
+    column: np.ndarray  # (term,)
+    number: np.ndarray  # (term,) row of the coefficient
+    rows: np.ndarray  # (distinct, LANES)
+
+
 class Vehicle(NamedTuple):
     """Train with open magnets; links in rows and columns of non-zero coefficients.
 
@@ -31,12 +41,12 @@ class Vehicle(NamedTuple):
     damping_number: np.ndarray
     link_start: np.ndarray  # (link + 1,) what pulls in a link
     link_scaled: np.ndarray  # (non-zero,)
-    link_coefficient: np.ndarray  # (non-zero,) own by link_number
-    link_number: np.ndarray
+    link_coefficient: np.ndarray  # (non-zero,)
     pull_start: np.ndarray  # (dof + 1,) the links that pull at a degree of freedom
     pull_link: np.ndarray  # (non-zero,)
-    pull_coefficient: np.ndarray  # (non-zero,) own by pull_number
-    pull_number: np.ndarray
+    pull_coefficient: np.ndarray  # (non-zero,)
+    own_link: Terms  # what each sample has of its own in links beyond these, and in pulls
+    own_pull: Terms
     body_z: np.ndarray  # (car,) degree of freedom
     body_y: np.ndarray  # (car,)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from maglev.compiled import kernel
-from maglev.mechanics.lanes import LANES, WIDE, entry, fma, load, own_of, store
+from maglev.mechanics.lanes import LANES, WIDE, entry, fma, load, store
 
 CACHE_LINE = 8
 """Doubles in a line of the processor's cache [-]."""
@@ -31,11 +31,15 @@ def weighted_sum(coefficients, columns, start, stop, source, total):
 
 
 @kernel()
-def own_sum(coefficients, numbers, columns, start, stop, source, total):
-    """As `weighted_sum`, with coefficients that each sample may have of its own."""
-    for k in range(start, stop):
-        total = fma(load(source, entry(columns, k)), own_of(coefficients, numbers, k), total)
-    return total
+def add_terms(terms, sign, source, target):
+    """``target[place] += sign Σ rows[number] source[column]`` for each sum of the terms."""
+    for n in range(terms.place.size):
+        total = load(source, 0) * 0.0
+        for k in range(entry(terms.start, n), entry(terms.start, n + 1)):
+            coefficient = load(terms.rows, entry(terms.number, k))
+            total = fma(load(source, entry(terms.column, k)), coefficient, total)
+        at = entry(terms.place, n)
+        store(target, at, fma(total, sign, load(target, at)))
 
 
 @kernel()

@@ -31,7 +31,15 @@ from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.linear import Block
-from maglev.mechanics.own import OwnTrain, own_footprints, own_law, own_timing, own_train
+from maglev.mechanics.own import (
+    OwnTrains,
+    Shape,
+    own_footprints,
+    own_law,
+    own_timing,
+    own_trains,
+    shape_of,
+)
 from maglev.mechanics.reduction import ReducedGuideway, reduce
 from maglev.mechanics.responses import Passages, checked_gains
 from maglev.mechanics.step_limit import (
@@ -103,7 +111,8 @@ def prepare(config: Config, profile: Profile) -> System:
     parts = train_parts(config)
     _check_step(config, reduced, parts)
     _check_reach(config, profile)
-    suspension, guidance = (packing.magnet_rows(train, guidance=kind) for kind in (False, True))
+    suspension = packing.magnet_rows(train, config.control.suspension, guidance=False)
+    guidance = packing.magnet_rows(train, config.control.guidance, guidance=True)
     suspension_footprints, suspension_ground = packing.footprints(
         config, suspension, guideway, reduced
     )
@@ -213,6 +222,7 @@ class _Batch:
     timing: Timing
     footprints: tuple[Footprints, Footprints]
     grounds: tuple[packing.Ground, packing.Ground]
+    shape: Shape | None
 
     def samples(self, rows: range) -> IntArray:
         """Numbers of the samples in rows; the last stands wherever a row is not full."""
@@ -237,14 +247,17 @@ def _batch(
     ]
     grounds = system.grounds
     footprints = (system.suspension_footprints, system.guidance_footprints)
+    if any(key.endswith(".failed_magnets") for key in values):
+        timing = timing._replace(first_step=1)
     if values:  # each sample's sag is its own: the shared track is the irregularity alone
         suspension, guidance = (
             replace(one, sag=0.0 * one.sag, sag_slope=0.0 * one.sag_slope) for one in grounds
         )
         grounds = (suspension, guidance)
         footprints = _on_tracks(footprints, packing.tracks(config, grounds, [system.profile]))
+    shape = shape_of(config, system.train, kinds, tuple(values)) if values else None
     return _Batch(
-        system, gains, values, profile_of, (laws[0], laws[1]), timing, footprints, grounds
+        system, gains, values, profile_of, (laws[0], laws[1]), timing, footprints, grounds, shape
     )
 
 
@@ -265,12 +278,11 @@ def _block(batch: _Batch, rows: range) -> tuple[Callable[[int], tuple], BoolArra
     numbers = batch.samples(rows)
     gains = batch.gains[numbers]
     n = min(rows.stop * LANES, batch.gains.shape[0]) - rows.start * LANES
-    if not batch.values:
+    if batch.shape is None:
         too_fast = samples_too_fast(system.parts, gains[:n], timing.time_step, system.safe_gains)
         return lambda row: _shared_arguments(batch, row), too_fast
     values = {key: of_all[numbers] for key, of_all in batch.values.items()}
-    kinds = (system.suspension, system.guidance)
-    own = own_train(system.config, system.train, kinds, values, numbers.size)
+    own = own_trains(batch.shape, values)
     too_fast = trains_too_fast(system.config, system.headroom, own.rates, gains, values)[:n]
     return lambda row: _own_arguments(batch, own, row, rows.start), too_fast
 
@@ -291,11 +303,11 @@ def _shared_arguments(batch: _Batch, row: int) -> tuple:
     )
 
 
-def _own_arguments(batch: _Batch, own: OwnTrain, row: int, first: int) -> tuple:
+def _own_arguments(batch: _Batch, own: OwnTrains, row: int, first: int) -> tuple:
     """Arguments of the kernel for a row of samples that have each a train of its own."""
     system, config = batch.system, batch.system.config
     samples = slice((row - first) * LANES, (row - first + 1) * LANES)
-    kinds = (own.kinds[0].row(samples), own.kinds[1].row(samples))
+    kinds = (own.kind(0, samples), own.kind(1, samples))
     timing = own_timing(batch.timing, own, samples)
     circuits = (config.control.suspension, config.control.guidance)
     laws = [
@@ -309,7 +321,7 @@ def _own_arguments(batch: _Batch, own: OwnTrain, row: int, first: int) -> tuple:
         )
     ]
     return (
-        own.vehicle.row(samples),
+        own.vehicle(samples),
         *kinds,
         *laws,
         *footprints,

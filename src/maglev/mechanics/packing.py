@@ -18,11 +18,12 @@ from maglev.mechanics._records import (
     Outcome,
     Spans,
     Stretches,
+    Terms,
     Timing,
     Vehicle,
 )
 from maglev.mechanics.activity import Stretch, stepped_mass, stretches, top_stiffness
-from maglev.mechanics.control import grouping, late_current
+from maglev.mechanics.control import grouping, late_current, without_current
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile, mean_displacement
 from maglev.mechanics.lanes import LANES
@@ -73,18 +74,23 @@ def vehicle(train: train_model.TrainModel) -> Vehicle:
         link_start=rows.indptr.astype(np.int64),
         link_scaled=number.ravel().astype(np.int64),
         link_coefficient=rows.data.astype(np.float64),
-        link_number=_SHARED,
         pull_start=columns.indptr.astype(np.int64),
         pull_link=columns.indices.astype(np.int64),
         pull_coefficient=columns.data.astype(np.float64),
-        pull_number=_SHARED,
+        own_link=no_terms(),
+        own_pull=no_terms(),
         body_z=np.ascontiguousarray(train.car_body_dof[:, 1], dtype=np.int64),
         body_y=np.ascontiguousarray(train.car_body_dof[:, 0], dtype=np.int64),
     )
 
 
-def magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
-    """Magnets of one kind for the kernels."""
+def no_terms() -> Terms:
+    """No sum in which a sample has anything of its own."""
+    return Terms(_SHARED, np.zeros(1, np.int64), _SHARED, _SHARED, np.zeros((0, LANES)))
+
+
+def magnet_rows(train: train_model.TrainModel, circuit: Circuit, *, guidance: bool) -> MagnetRows:
+    """Magnets of one kind for the kernels; those that carry no current have a largest of zero."""
     magnet: Magnet = (
         train.parameters.guidance_magnet if guidance else train.parameters.suspension_magnet
     )
@@ -96,6 +102,11 @@ def magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
     if right.size != left.size or np.abs(table.x[right] - table.x[left]).max() > 1e-9:
         raise ValueError("magnets must stand in pairs, right and left at the same place")
     number = np.stack([right, left], axis=1)
+    of_kind = np.flatnonzero(table.is_guidance == guidance)
+    failed = np.zeros(table.x.size, dtype=bool)
+    failed[of_kind] = without_current(
+        circuit, table.x[of_kind], table.side[of_kind], guidance=guidance
+    )
     offset = train_model.pole_offsets(magnet)
     arm = offset if guidance else -offset
     rest = train_model.pole_static_force(train.parameters, table)[number][:, :, : offset.size]
@@ -115,7 +126,7 @@ def magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
         outward=np.array([1.0, -1.0 if guidance else 1.0]),
         gap_reference=magnet.gap_reference,
         current_reference=magnet.current_reference,
-        current_max=np.full(number.size, magnet.current_max),
+        current_max=np.where(failed[number].ravel(), 0.0, magnet.current_max),
         current_number=_SHARED,
         mass=magnet.mass,
         inertia=magnet.inertia,

@@ -264,7 +264,7 @@ def trains_too_fast(
     known
         From `headroom`.
     rates
-        Of each sample's train.
+        Of each sample's train; what stands behind them does not count.
     gains : (sample, 8)
         Of each sample.
     values : key of (sample,)
@@ -275,8 +275,9 @@ def trains_too_fast(
     too_fast : (sample,)
         True where the step is too large.
     """
+    n_samples = gains.shape[0]
     faster = [
-        (_share(own, mean)).max(axis=1)
+        _share(own[:n_samples], mean).max(axis=1)
         for own, mean in (
             (rates.stiffness, known.rates.stiffness),
             (rates.damping, known.rates.damping),

@@ -35,7 +35,11 @@ _PLACES = (
 _ALIKE = (
     "passage.gap_contact",
     "passage.gap_lost",
-    *(f"control.{kind}.lag" for kind in ("suspension", "guidance")),
+    *(
+        f"control.{kind}.{name}"
+        for kind in ("suspension", "guidance")
+        for name in ("lag", "failed_magnets")
+    ),
 )
 """Numbers beyond the train's that each sample has in its lane."""
 
