@@ -28,7 +28,7 @@ from maglev.mechanics.responses import (
     checked_gains,
     in_their_order,
 )
-from maglev.mechanics.varied import checked_values, cost_of, equal_samples
+from maglev.mechanics.varied import beyond_the_basis, checked_values, cost_of, equal_samples
 from maglev.parameters import Config
 
 KEPT_TRACKS = 64
@@ -163,16 +163,24 @@ def _groups(
 ) -> list[_Group]:
     """Samples in groups of equal values of what is built anew; all of it for the reference."""
     cost = cost_of(config, values)
-    built = [key for key in values if cost[key] != "sample" or solver == "reference"]
+    built = [key for key in values if cost[key] == "rebuild" or solver == "reference"]
     own = tuple(key for key in values if key not in built)
+    anew = np.zeros(n_samples, dtype=bool)
+    for key in own:
+        if cost[key] == "guideway":
+            anew |= beyond_the_basis(config, key, values[key])
     for sample in range(n_samples if own else 0):  # refused before anything is computed
         numbers = {key: float(values[key][sample]) for key in values}
         config.with_numbers(numbers, f"sample {sample}: ")
+    columns = [values[key] for key in built]
+    columns += [np.where(anew, values[key], 0.0) for key in own if cost[key] == "guideway"]
     found = []
-    for rows in equal_samples([values[key] for key in built], n_samples):
-        numbers = {key: float(values[key][rows[0]]) for key in built}
-        place = f"sample {rows[0]}: " if built else ""
-        found.append(_Group(rows, config.with_numbers(numbers, place) if built else config, own))
+    for rows in equal_samples([*columns, anew], n_samples):
+        whole = [key for key in own if anew[rows[0]] and cost[key] == "guideway"]
+        numbers = {key: float(values[key][rows[0]]) for key in [*built, *whole]}
+        place = f"sample {rows[0]}: "
+        of_group = config.with_numbers(numbers, place) if numbers else config
+        found.append(_Group(rows, of_group, tuple(key for key in own if key not in whole)))
     return found
 
 

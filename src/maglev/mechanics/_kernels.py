@@ -22,14 +22,28 @@ from maglev.mechanics._records import (
 )
 from maglev.mechanics._rows import (
     add_terms,
+    change,
+    change_back,
     gather,
+    own_sum,
     project,
     transform,
     transform_both,
     weighted_sum,
     zeros,
 )
-from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, own_of, store
+from maglev.mechanics.lanes import (
+    LANES,
+    choose,
+    entry,
+    fma,
+    has_rows,
+    load,
+    maximum,
+    own,
+    own_of,
+    store,
+)
 
 
 @kernel()
@@ -111,6 +125,16 @@ def _move_span(spans, span, begin, end, source, packed, motion):
     out, out_end = spans.sideways_start[span], spans.sideways_start[span + 1]
     gather(source, spans.upright, up, up_end, packed, 0)
     gather(source, spans.sideways, out, out_end, packed, up_end - up)
+    if has_rows(spans.change):
+        n, m = spans.rail_z.shape[0], spans.rail_y.shape[0]
+        changed, place = up_end - up + out_end - out, spans.change_start[span]
+        change(spans.change, place, n, up_end - up, packed, 0, packed, changed)
+        place += n * (up_end - up)
+        change(
+            spans.change, place, m, out_end - out, packed, up_end - up, packed, changed + n
+        )  # fmt: skip
+        gather(packed, spans.in_order, changed, changed + n + m, packed, 0)
+        up, up_end, out, out_end = 0, n, 0, m
     transform_both(
         spans.rail_z, up, up_end, spans.rail_roll, out, out_end, packed, begin, end,
         motion[0], motion[1], at,
@@ -132,7 +156,7 @@ def _move_rails(spans, first, last, tail, nose, guideway, packed, rails):
 
 
 @kernel()
-def _load_span(spans, span, begin, end, rails, turn, force):
+def _load_span(spans, span, begin, end, rails, turn, packed, force):
     """Add the forces on a span's rails to the coordinates that move them.
 
     Leaves the sum of right and left in ``rails.force[0]`` and the difference in ``turn``.
@@ -144,13 +168,26 @@ def _load_span(spans, span, begin, end, rails, turn, force):
         right, left = load(rails.force[0], at + k), load(rails.force[1], at + k)
         store(rails.force[0], at + k, right + left)
         store(turn, k, right - left)
+    if has_rows(spans.change):
+        n, m = spans.rail_z.shape[0], spans.rail_y.shape[0]
+        for k in range(n + m):
+            store(packed, k, 0.0)
+        order, of_y = spans.in_order, packed[n:]
+        project(spans.rail_z, order, 0, n, begin, end, rails.force[0], at, packed)
+        project(spans.rail_roll, order, 0, m, begin, end, turn, 0, of_y)
+        project(spans.rail_y, order, 0, m, begin, end, rails.force[2], at, of_y)
+        place = spans.change_start[span]
+        change_back(spans.change, place, n, up_end - up, packed, 0, spans.upright, up, force)
+        place += n * (up_end - up)
+        change_back(spans.change, place, m, out_end - out, packed, n, spans.sideways, out, force)
+        return
     project(spans.rail_z, spans.upright, up, up_end, begin, end, rails.force[0], at, force)
     project(spans.rail_roll, spans.sideways, out, out_end, begin, end, turn, 0, force)
     project(spans.rail_y, spans.sideways, out, out_end, begin, end, rails.force[2], at, force)
 
 
 @kernel()
-def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway):
+def _load_guideway(spans, first, last, tail, nose, rails, turn, packed, guideway):
     """Put the forces on the rails under the train on the guideway.
 
     Returns the motion of midspan, z and y, that modes left out have under them.
@@ -159,21 +196,23 @@ def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway):
     rest_y = rest_z
     for span in range(first, last + 1):
         begin, end = _covered(spans, span, tail, nose)
-        _load_span(spans, span, begin, end, rails, turn, guideway.force)
+        _load_span(spans, span, begin, end, rails, turn, packed, guideway.force)
         if span == spans.middle:
             at = span * spans.stride
             for k in range(begin, end):
-                rest_z = fma(load(rails.force[0], at + k), spans.rest[0, k], rest_z)
-                rest_y = fma(load(turn, k), spans.rest[1, k], rest_y)
-                rest_y = fma(load(rails.force[2], at + k), spans.rest[2, k], rest_y)
+                roll, y = spans.stride + k, 2 * spans.stride + k
+                rest_z = fma(load(rails.force[0], at + k), own(spans.rest, k), rest_z)
+                rest_y = fma(load(turn, k), own(spans.rest, roll), rest_y)
+                rest_y = fma(load(rails.force[2], at + k), own(spans.rest, y), rest_y)
     return rest_z, rest_y
 
 
 @kernel()
-def _still(stretches, stretch, guideway):
+def _still(stretches, stretch, rates, guideway):
     """Leave the coordinates alone that are no longer stepped: modes at rest."""
     for k in range(stretches.stilled_start[stretch], stretches.stilled_start[stretch + 1]):
         i = stretches.stilled[k]
+        store(rates, i, 0.0)
         for state in guideway:
             store(state, i, 0.0)
 
@@ -194,10 +233,39 @@ def _advance_guideway(stretches, stretch, dt, guideway):
 
 
 @kernel()
-def _answer(spans, stretch, guideway):
+def _damp_bearings(spans, stretch, guideway):
+    """Put the forces of the bearings' dampers on the coordinates of spans that are awake."""
+    velocity, force = guideway.predicted, guideway.force
+    none = load(force, 0) * 0.0
+    n_columns = spans.damped.shape[1]
+    for span in range(spans.n_spans):
+        if not spans.stretches.awake[stretch, span]:
+            continue
+        at, place, even = n_columns * span, spans.damper_start[span], spans.n_even[span]
+        for family in range(2):
+            first, last = (0, even) if family == 0 else (even, n_columns)
+            width = last - first
+            for _ in range(12):
+                rate, more = none, none
+                for k in range(0, width - 1, 2):  # two sums: neither waits for the other
+                    i, j = entry(spans.damped, at + first + k), entry(spans.damped, at + first + k + 1)
+                    rate = fma(load(velocity, i), own(spans.damper, place + k), rate)
+                    more = fma(load(velocity, j), own(spans.damper, place + k + 1), more)
+                if width % 2 == 1:
+                    i = entry(spans.damped, at + last - 1)
+                    rate = fma(load(velocity, i), own(spans.damper, place + width - 1), rate)
+                rate = none - (rate + more)
+                for k in range(width):
+                    i = entry(spans.damped, at + first + k)
+                    store(force, i, fma(rate, own(spans.damper, place + k), load(force, i)))
+                place += width
+
+
+@kernel()
+def _answer(spans, stretch, scaled, guideway):
     """Turn the forces on the coordinates that are stepped into accelerations, in place."""
     x, velocity, force = guideway.position, guideway.predicted, guideway.force
-    n_modes, stretches = spans.square.size, spans.stretches
+    n_modes, stretches = spans.carried_start.size - 1, spans.stretches
     start, tops, stop = (
         stretches.start[stretch],
         stretches.tops[stretch],
@@ -205,16 +273,29 @@ def _answer(spans, stretch, guideway):
     )
     none = load(force, 0) * 0.0
     damping, column = spans.damping, spans.damping_column
+    if has_rows(spans.damper):
+        _damp_bearings(spans, stretch, guideway)
+    if has_rows(spans.damping_root):
+        velocity = scaled
+        for n in range(start, stop):
+            i = entry(stretches.stepped, n)
+            root = own_of(spans.damping_root, spans.root_number, i)
+            store(scaled, i, load(guideway.predicted, i) * root)
     for n in range(start, stop):
         i = entry(stretches.stepped, n)
         if n < tops:
-            back = load(x, i) * entry(spans.square, i)
+            back = load(x, i) * own_of(spans.square, spans.mode_number, i)
         else:  # modes come first
             first, last = entry(stretches.taken_from, n), entry(stretches.taken_to, n)
-            back = weighted_sum(spans.taken, spans.taken_mode, first, last, force, none)
+            number = spans.taken_number
+            back = own_sum(spans.taken, number, spans.taken_mode, first, last, force, none)
             first = entry(spans.stiffness_start, i - n_modes)
             last = entry(spans.stiffness_start, i - n_modes + 1)
-            back = weighted_sum(spans.stiffness, spans.stiffness_top, first, last, x, back)
+            number = spans.stiffness_number
+            back = own_sum(spans.stiffness, number, spans.stiffness_top, first, last, x, back)
+        elastic = back
+        if has_rows(spans.damping_root):
+            back = none
         drag = none
         first, last = entry(stretches.damping_from, n), entry(stretches.damping_to, n)
         for k in range(first, last - 1, 2):  # two sums: neither waits for the other
@@ -222,26 +303,32 @@ def _answer(spans, stretch, guideway):
             back = fma(load(velocity, entry(column, k + 1)), entry(damping, k + 1), back)
         if (last - first) % 2 == 1:
             drag = fma(load(velocity, entry(column, last - 1)), entry(damping, last - 1), drag)
-        store(force, i, load(force, i) - (back + drag))
+        if has_rows(spans.damping_root):
+            root = own_of(spans.damping_root, spans.root_number, i)
+            store(force, i, load(force, i) - fma(back + drag, root, elastic))
+        else:
+            store(force, i, load(force, i) - (back + drag))
     for n in range(tops, stop):
         i = entry(stretches.stepped, n)
         first, last = entry(stretches.factor_start, n), entry(stretches.factor_start, n + 1)
-        total = load(force, i) - weighted_sum(
-            stretches.factor, stretches.factor_top, first, last, force, none
+        total = load(force, i) - own_sum(
+            stretches.factor, spans.in_order, stretches.factor_top, first, last, force, none
         )
-        store(force, i, total * entry(stretches.factor_inverse, n))
+        store(force, i, total * own(stretches.factor_inverse, n))
     for n in range(stop - 1, tops - 1, -1):
         i = entry(stretches.stepped, n)
-        total = load(force, i) * entry(stretches.factor_inverse, n)
+        total = load(force, i) * own(stretches.factor_inverse, n)
         store(force, i, total)
         for k in range(entry(stretches.factor_start, n), entry(stretches.factor_start, n + 1)):
             at = entry(stretches.factor_top, k)
-            store(force, at, load(force, at) - total * entry(stretches.factor, k))
+            store(force, at, load(force, at) - total * own(stretches.factor, k))
     for n in range(start, tops):
         i = entry(stretches.stepped, n)
         first, last = entry(spans.carried_start, i), entry(spans.carried_start, i + 1)
-        along = weighted_sum(spans.carried, spans.carried_top, first, last, force, none)
-        store(force, i, (load(force, i) - along) * entry(spans.response, i))
+        number = spans.carried_number
+        along = own_sum(spans.carried, number, spans.carried_top, first, last, force, none)
+        response = own_of(spans.response, spans.mode_number, i)
+        store(force, i, (load(force, i) - along) * response)
 
 
 @kernel()
@@ -311,7 +398,7 @@ def _watch_midspan(spans, timing, step, direction, rest, guideway, watch, outcom
     n_columns = spans.output_column.size
     for k in range(n_columns):
         column = entry(spans.output_column, k)
-        share = entry(spans.midspan, direction * n_columns + k)
+        share = own(spans.midspan, direction * n_columns + k)
         shift = fma(load(guideway.position, column), share, shift)
         raw = fma(load(guideway.force, column), share, raw)
     change = rest - load(watch.left_out, 3 * direction)
@@ -426,10 +513,11 @@ def cross(
     n_cars, n_magnets = vehicle.body_z.size, 2 * (suspension.x.size + guidance.x.size)
     dt, stretches = timing.time_step, spans.stretches
     train = at_rest(vehicle.pull_start.size - 1)
-    guideway = at_rest(spans.square.size + spans.stiffness_start.size - 1)
+    guideway = at_rest(spans.carried_start.size + spans.stiffness_start.size - 2)
+    rates = zeros(guideway.force.shape[0])
     rails = _straight_rails(spans)
     scaled, pull = zeros(vehicle.scaled_dof.size), zeros(vehicle.link_start.size - 1)
-    packed, turn = zeros(spans.upright.size + spans.sideways.size), zeros(spans.stride)
+    packed, turn = zeros(spans.in_order.size), zeros(spans.stride)
     lifting = empty_magnet(suspension, suspension_law)
     guiding = empty_magnet(guidance, guidance_law)
     lifting_circuits = circuits_at_rest(suspension, suspension_law)
@@ -445,7 +533,7 @@ def cross(
         _advance_train(vehicle, dt, train)
         while stretch + 1 < stretches.first_step.size and step >= stretches.first_step[stretch + 1]:
             stretch += 1
-            _still(stretches, stretch, guideway)
+            _still(stretches, stretch, rates, guideway)
         if stretch >= 0:
             _advance_guideway(stretches, stretch, dt, guideway)
         _move_rails(spans, first, last, tail, nose, guideway, packed, rails)
@@ -458,9 +546,11 @@ def cross(
             guidance_footprints, guidance, guidance_law, step, dt, gains, train, rails,
             guiding, guiding_circuits, record, watch, outcome,
         )  # fmt: skip
-        rest_z, rest_y = _load_guideway(spans, first, last, tail, nose, rails, turn, guideway)
+        rest_z, rest_y = _load_guideway(
+            spans, first, last, tail, nose, rails, turn, packed, guideway
+        )
         if stretch >= 0:
-            _answer(spans, stretch, guideway)
+            _answer(spans, stretch, rates, guideway)
         _watch_midspan(spans, timing, step, 0, rest_z, guideway, watch, outcome)
         _watch_midspan(spans, timing, step, 1, rest_y, guideway, watch, outcome)
         _watch_cars(vehicle, timing, step, train, watch, outcome)

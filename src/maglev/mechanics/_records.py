@@ -168,10 +168,11 @@ class Stretches(NamedTuple):
     taken_to: np.ndarray
     factor_start: np.ndarray  # (stepped + 1,) Cholesky rows of the mass of stepped pier tops
     factor_top: np.ndarray  # coordinate
-    factor: np.ndarray
-    factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal
+    factor: np.ndarray  # own by the number of the entry
+    factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal, own likewise
     stilled_start: np.ndarray  # (stretch + 1,) coordinates that the stretch before stepped
     stilled: np.ndarray
+    awake: np.ndarray  # (stretch, span) whether all of a span is stepped
 
 
 class Spans(NamedTuple):
@@ -179,6 +180,12 @@ class Spans(NamedTuple):
 
     A mode counts from where the pier tops would take it if it were rigid.  While the train is where
     it is, only the coordinates of a stretch are stepped; the other modes follow the pier tops.
+
+    Where samples have guideways of their own, the rails' shapes are those of a basis that all
+    share, the same for each span, and a sample's coordinates change to it: ``change`` holds the
+    matrix (upright of the basis, upright), then (sideways of the basis, sideways), row by row.
+    Their bearings damp on their own: ``damper`` holds the stretch of twelve, times the root of what
+    they damp, per unit of each even coordinate of a span, then of each odd one, row by row.
     """
 
     n_spans: int
@@ -192,23 +199,36 @@ class Spans(NamedTuple):
     rail_z: np.ndarray  # (upright, stride)
     rail_roll: np.ndarray  # (sideways, stride)
     rail_y: np.ndarray  # (sideways, stride)
-    square: np.ndarray  # (mode,) squared circular frequency [1/s^2]
-    response: np.ndarray  # (mode,) makes the step exact for a mode on its own [-]
+    change: np.ndarray  # (0,) none; own (entry, LANES): see below
+    change_start: np.ndarray  # (span,) where a span's changes begin
+    square: np.ndarray  # (mode,) squared circular frequency [1/s^2] own by mode_number
+    response: np.ndarray  # (mode,) makes the step exact for a mode on its own [-] own likewise
+    mode_number: np.ndarray
     carried_start: np.ndarray  # (mode + 1,) what modes take along of the pier tops' motion
     carried_top: np.ndarray  # coordinate
-    carried: np.ndarray
+    carried: np.ndarray  # own by carried_number
+    carried_number: np.ndarray
     damping_column: np.ndarray  # coordinate, in rows that the stretches name
     damping: np.ndarray
+    damping_root: np.ndarray  # (coordinate,) factors on row and column; own by root_number
+    root_number: np.ndarray
+    damper: np.ndarray  # (0,) none; own (damper column, LANES): see below
+    damper_start: np.ndarray  # (span,) where a span's dampers begin
+    damped: np.ndarray  # (span, column) coordinates that stretch its bearings; even ones first
+    n_even: np.ndarray  # (span,) how many of these are even
     taken_mode: np.ndarray  # the same as carried by pier tops, in rows that the stretches name
-    taken: np.ndarray
+    taken: np.ndarray  # own by taken_number
+    taken_number: np.ndarray
     stiffness_start: np.ndarray  # (top + 1,) between pier tops
     stiffness_top: np.ndarray  # coordinate
-    stiffness: np.ndarray
+    stiffness: np.ndarray  # own by stiffness_number
+    stiffness_number: np.ndarray
     stretches: Stretches
     output_column: np.ndarray  # (output column,) coordinates that move midspan
-    midspan: np.ndarray  # (2, output column) z and y
+    midspan: np.ndarray  # (2 output column,) z and y, own (2 output column, LANES)
     middle: int  # span that midspan is of
-    rest: np.ndarray  # (3, stride) midspan z by z, y by roll and y of its left-out modes [m/N]
+    rest: np.ndarray  # (3 stride,) midspan z by z, y by roll and y of its left-out modes [m/N] own
+    in_order: np.ndarray  # 0, 1, 2, … as many as there are rows of any table here
 
 
 class Footprints(NamedTuple):

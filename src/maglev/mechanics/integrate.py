@@ -40,6 +40,7 @@ from maglev.mechanics.own import (
     own_trains,
     shape_of,
 )
+from maglev.mechanics.own_spans import Frame, frame_of, guideways_of, own_spans
 from maglev.mechanics.reduction import ReducedGuideway, reduce
 from maglev.mechanics.responses import Passages, checked_gains
 from maglev.mechanics.step_limit import (
@@ -62,6 +63,7 @@ class System:
     """Train, guideway, magnets and track as arrays for the kernels."""
 
     train: train_model.TrainModel
+    guideway: guideway_model.GuidewayModel
     reduced: ReducedGuideway
     vehicle: Vehicle
     suspension: MagnetRows
@@ -121,6 +123,7 @@ def prepare(config: Config, profile: Profile) -> System:
     tracks = packing.tracks(config, grounds, [profile])
     return System(
         train=train,
+        guideway=guideway,
         reduced=reduced,
         vehicle=packing.vehicle(train),
         suspension=suspension,
@@ -186,24 +189,24 @@ def integrate(
     """
     gains = checked_gains(gains, system.config.gains.further)
     batch = _batch(system, gains, values or {}, profile_of, record_every)
-    outcomes: list[Outcome] = []
-    too_fast = []
+    found: list[tuple[Outcome, BoolArray]] = []
     n_rows = -(-gains.shape[0] // LANES)
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
         for first in range(0, n_rows, BLOCK):
             rows = range(first, min(first + BLOCK, n_rows))
-            arguments, of_block = _block(batch, rows)
+            of_row = _block(batch, rows)
 
-            def one_row(row: int, arguments: Callable[[int], tuple] = arguments) -> Outcome:
-                ready = arguments(row)
-                cross(*ready)
+            def one_row(row: int, of_row: RowOf = of_row) -> tuple[Outcome, BoolArray]:
+                arguments, too_fast = of_row(row)
+                cross(*arguments)
                 if on_progress is not None:
                     on_progress(min(LANES, gains.shape[0] - row * LANES))
-                return ready[-1]
+                return arguments[-1], too_fast
 
-            outcomes += pool.map(one_row, rows)
-            too_fast.append(of_block)
-    return _gathered(outcomes, gains.shape[0], system, batch.timing, np.concatenate(too_fast))
+            found += pool.map(one_row, rows)
+    outcomes = [outcome for outcome, _ in found]
+    too_fast = np.concatenate([flags for _, flags in found])[: gains.shape[0]]
+    return _gathered(outcomes, gains.shape[0], system, batch.timing, too_fast)
 
 
 BLOCK = 16
@@ -223,6 +226,7 @@ class _Batch:
     footprints: tuple[Footprints, Footprints]
     grounds: tuple[packing.Ground, packing.Ground]
     shape: Shape | None
+    frame: Frame | None
 
     def samples(self, rows: range) -> IntArray:
         """Numbers of the samples in rows; the last stands wherever a row is not full."""
@@ -255,9 +259,25 @@ def _batch(
         )
         grounds = (suspension, guidance)
         footprints = _on_tracks(footprints, packing.tracks(config, grounds, [system.profile]))
-    shape = shape_of(config, system.train, kinds, tuple(values)) if values else None
+    of_guideway = tuple(key for key in values if key.startswith("guideway."))
+    others = tuple(key for key in values if key not in of_guideway)
+    shape = shape_of(config, system.train, kinds, others) if values else None
+    frame = (
+        frame_of(config, system.guideway, system.reduced, system.spans, of_guideway)
+        if of_guideway
+        else None
+    )
     return _Batch(
-        system, gains, values, profile_of, (laws[0], laws[1]), timing, footprints, grounds, shape
+        system,
+        gains,
+        values,
+        profile_of,
+        (laws[0], laws[1]),
+        timing,
+        footprints,
+        grounds,
+        shape,
+        frame,
     )
 
 
@@ -272,19 +292,42 @@ def _on_tracks(
     return first, second
 
 
-def _block(batch: _Batch, rows: range) -> tuple[Callable[[int], tuple], BoolArray]:
-    """Arguments of the kernel of each row by its number, and whose step is too large."""
+RowOf = Callable[[int], tuple[tuple, BoolArray]]
+"""Arguments of the kernel for a row by its number, and which of its samples the step is too large
+for (LANES,)."""
+
+
+def _block(batch: _Batch, rows: range) -> RowOf:
+    """What becomes of the rows of a block."""
     system, timing = batch.system, batch.timing
     numbers = batch.samples(rows)
     gains = batch.gains[numbers]
-    n = min(rows.stop * LANES, batch.gains.shape[0]) - rows.start * LANES
+
+    def lanes(row: int) -> slice:
+        return slice((row - rows.start) * LANES, (row - rows.start + 1) * LANES)
+
     if batch.shape is None:
-        too_fast = samples_too_fast(system.parts, gains[:n], timing.time_step, system.safe_gains)
-        return lambda row: _shared_arguments(batch, row), too_fast
+        too_fast = samples_too_fast(system.parts, gains, timing.time_step, system.safe_gains)
+        return lambda row: (_shared_arguments(batch, row), too_fast[lanes(row)])
     values = {key: of_all[numbers] for key, of_all in batch.values.items()}
-    own = own_trains(batch.shape, values)
-    too_fast = trains_too_fast(system.config, system.headroom, own.rates, gains, values)[:n]
-    return lambda row: _own_arguments(batch, own, row, rows.start), too_fast
+    others = {key: values[key] for key in batch.shape.keys}
+    own = own_trains(batch.shape, others, numbers.size)
+    too_fast = trains_too_fast(system.config, system.headroom, own.rates, gains, others)
+
+    def of_row(row: int) -> tuple[tuple, BoolArray]:
+        samples = lanes(row)
+        spans, beyond = system.spans, np.zeros(LANES, dtype=bool)
+        stiffer = np.ones(LANES)
+        if batch.frame is not None:
+            each = {key: one[samples] for key, one in values.items()}
+            guideways = guideways_of(system.config, each, range(LANES))
+            spans, beyond = own_spans(batch.frame, guideways)
+            modulus = [one.rail.section.elastic_modulus for one in guideways]
+            stiffer = np.array(modulus) / system.config.guideway.rail.section.elastic_modulus
+        arguments = _own_arguments(batch, own, row, samples, spans, 1.0 / stiffer)
+        return arguments, too_fast[samples] | beyond
+
+    return of_row
 
 
 def _shared_arguments(batch: _Batch, row: int) -> tuple:
@@ -303,10 +346,14 @@ def _shared_arguments(batch: _Batch, row: int) -> tuple:
     )
 
 
-def _own_arguments(batch: _Batch, own: OwnTrains, row: int, first: int) -> tuple:
-    """Arguments of the kernel for a row of samples that have each a train of its own."""
+def _own_arguments(
+    batch: _Batch, own: OwnTrains, row: int, samples: slice, spans: Spans, softer: FloatArray
+) -> tuple:
+    """Arguments of the kernel for a row of samples that have each a train of its own.
+
+    The sag is that of the rail between its connectors: it goes with the rail's softness.
+    """
     system, config = batch.system, batch.system.config
-    samples = slice((row - first) * LANES, (row - first + 1) * LANES)
     kinds = (own.kind(0, samples), own.kind(1, samples))
     timing = own_timing(batch.timing, own, samples)
     circuits = (config.control.suspension, config.control.guidance)
@@ -315,7 +362,7 @@ def _own_arguments(batch: _Batch, own: OwnTrains, row: int, first: int) -> tuple
         for law, lag, circuit in zip(batch.laws, own.lag, circuits, strict=True)
     ]
     footprints = [
-        own_footprints(one, ground, level[samples], sagging[samples], config.passage.speed)
+        own_footprints(one, ground, level[samples], sagging[samples] * softer, config.passage.speed)
         for one, ground, level, sagging in zip(
             _tracks_of_row(batch, row), system.grounds, own.level, own.sagging, strict=True
         )
@@ -325,7 +372,7 @@ def _own_arguments(batch: _Batch, own: OwnTrains, row: int, first: int) -> tuple
         *kinds,
         *laws,
         *footprints,
-        system.spans,
+        spans,
         timing,
         np.ascontiguousarray(batch.gains[batch.samples(range(row, row + 1))].T),
         packing.empty_outcome(system.train, kinds, timing),

@@ -9,6 +9,7 @@ would first ask of every index whether it counts from the end.
 `own` and `own_of` read what either all samples share or each has of its own, by the type of what
 holds it: numbers ``(…,)`` are shared, rows ``(…, LANES)`` are not.  One source of a kernel so
 becomes two pieces of machine code, and that of shared numbers is the same as if there were no rows.
+`has_rows` is known when a kernel is compiled, and what it excludes is left out.
 `met` is ``value`` where ``level`` is a number, and ``value level + more times`` where it is a row.
 
 With ``NUMBA_DISABLE_JIT=1`` the same names act on NumPy rows, so that kernels run as plain Python.
@@ -185,6 +186,16 @@ def _own_of(typing_context: Any, values: Any, numbers: Any, place: Any) -> Any:
 
 
 @intrinsic
+def _has_rows(typing_context: Any, values: Any) -> Any:
+    rows = _is_rows(values)
+
+    def codegen(context: Any, builder: Any, sig: Signature, args: Any) -> Any:
+        return context.get_constant(types.boolean, rows)
+
+    return types.boolean(values), codegen
+
+
+@intrinsic
 def _met(typing_context: Any, value: Any, level: Any, more: Any, times: Any) -> Any:
     own_level = _is_rows(level)
 
@@ -267,6 +278,10 @@ def _own_of_python(values: Any, numbers: np.ndarray, place: int) -> Any:
     return _own_python(values, int(numbers[place]) if rows else place)
 
 
+def _has_rows_python(values: Any) -> bool:
+    return isinstance(values, np.ndarray) and values.ndim == 2
+
+
 def _met_python(value: Any, level: Any, more: Any, times: Any) -> Any:
     if not isinstance(level, np.ndarray):
         return value
@@ -292,8 +307,8 @@ def _choose_python(a: Any, b: Any, x: Any, y: Any) -> Any:
 if numba.config.DISABLE_JIT:
     load, store, fma, choose = _load_python, _store_python, _fma_python, _choose_python
     minimum, maximum, entry = _minimum_python, _maximum_python, _entry_python
-    own, own_of, met = _own_python, _own_of_python, _met_python
+    own, own_of, met, has_rows = _own_python, _own_of_python, _met_python, _has_rows_python
 else:
     load, store, fma, choose = _load, _store, _fma, _choose
     minimum, maximum, entry = _minimum, _maximum, _entry
-    own, own_of, met = _own, _own_of, _met
+    own, own_of, met, has_rows = _own, _own_of, _met, _has_rows

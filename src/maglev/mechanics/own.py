@@ -349,7 +349,7 @@ class OwnTrains:
         )
 
 
-def own_trains(shape: Shape, values: Mapping[str, FloatArray]) -> OwnTrains:
+def own_trains(shape: Shape, values: Mapping[str, FloatArray], n_samples: int) -> OwnTrains:
     """Trains of samples that have numbers of their own.
 
     Parameters
@@ -358,6 +358,8 @@ def own_trains(shape: Shape, values: Mapping[str, FloatArray]) -> OwnTrains:
         From `shape_of` for the same keys.
     values : key of (sample,)
         Numbers in SI.
+    n_samples
+        Number of samples.
 
     Raises
     ------
@@ -366,7 +368,7 @@ def own_trains(shape: Shape, values: Mapping[str, FloatArray]) -> OwnTrains:
     """
     config = shape.config
     behind = {key: np.append(values[key], shape.unlike[key]) for key in shape.keys}
-    n_samples = next(iter(behind.values())).size
+    n_samples += 1
     own: Config = with_arrays(config, behind)
     trains = trains_model.build(own.train, shape.train.magnets, n_samples)
     suspension, guidance = _numbers(own, shape.kinds, trains)

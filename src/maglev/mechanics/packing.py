@@ -343,10 +343,10 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
     of_passage = stretches(config, reduced)
     always = np.logical_and.reduce([stretch.stepped for stretch in of_passage])
     damping_start, damping_column, damping = _rows(
-        _whole_and_short(_stepped_damping(reduced, way.time_step), always)
+        whole_and_short(_stepped_damping(reduced, way.time_step), always)
     )
     taken_start, taken_mode, taken = _rows(
-        _whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
+        whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
     )
     return Spans(
         n_spans=reduced.parameters.n_spans,
@@ -360,22 +360,35 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
         rail_z=stacked(rails[0], upright),
         rail_roll=stacked(rails[1], sideways),
         rail_y=stacked(rails[2], sideways),
+        change=np.zeros(0),
+        change_start=_SHARED,
         square=reduced.stiffness.diagonal()[:n],
         response=response[:n],
+        mode_number=_SHARED,
         carried_start=carried_start,
         carried_top=carried_top + n,
         carried=carried,
+        carried_number=_SHARED,
         stiffness_start=stiffness_start,
         stiffness_top=stiffness_top + n,
         stiffness=stiffness,
+        stiffness_number=_SHARED,
         output_column=columns[middle],
-        midspan=midspan,
+        midspan=midspan.ravel(),
         middle=middle,
-        rest=np.stack([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
+        rest=np.concatenate([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
+        in_order=np.arange(upright_column.size + sideways_column.size),
         damping_column=damping_column,
         damping=damping,
+        damping_root=np.zeros(0),
+        root_number=_SHARED,
+        damper=np.zeros(0),
+        damper_start=_SHARED,
+        damped=np.zeros((0, 0), dtype=np.int64),
+        n_even=_SHARED,
         taken_mode=taken_mode,
         taken=taken,
+        taken_number=_SHARED,
         stretches=_stretches(reduced, config, of_passage, damping_start, taken_start),
     )
 
@@ -402,7 +415,7 @@ def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array
     return damping
 
 
-def _whole_and_short(matrix: sp.csr_array, always: BoolArray) -> sp.csr_array:
+def whole_and_short(matrix: sp.csr_array, always: BoolArray) -> sp.csr_array:
     """The rows of a matrix, then the same without columns that are not stepped in all stretches.
 
     Short rows are those of quiet spans.
@@ -423,7 +436,7 @@ def _stretches(
 
     With the ends of their rows, whole or short, of damping and of modes carried by pier tops.
     """
-    n = reduced.n_modes
+    n, n_spans = reduced.n_modes, reduced.parameters.n_spans
     dt = course(config).time_step
     starts, tops_from, stepped, rows = [0], [], [], []
     factor_rows, factor_start, inverse = [], [0], []
@@ -464,6 +477,12 @@ def _stretches(
         factor_inverse=np.concatenate(inverse),
         stilled_start=np.cumsum([0, *(one.size for one in stilled)]),
         stilled=np.concatenate(stilled),
+        awake=np.array(
+            [
+                [stretch.stepped[reduced.own_modes(span)].all() for span in range(n_spans)]
+                for stretch in of_passage
+            ]
+        ),
     )
 
 

@@ -460,7 +460,7 @@ def reduce(
     rest_z, rest_roll, rest_y = _rest_at_midspan(model, reduced)
     return replace(
         reduced,
-        relative_damping=_relative_damping(reduced, bearings, cutoff),
+        relative_damping=relative_damping(reduced, bearings, cutoff),
         rest_z=rest_z,
         rest_roll=rest_roll,
         rest_y=rest_y,
@@ -541,12 +541,21 @@ def _pruned_to(matrix: sp.csr_array, drop: float) -> sp.csr_array:
     return sp.csr_array((coo.data[keep], (coo.row[keep], coo.col[keep])), shape=matrix.shape)
 
 
-def _relative_damping(
+def relative_damping(
     reduced: ReducedGuideway, bearings: FloatArray, cutoff: float
 ) -> sp.csr_array:
     """Damping: a given share of critical up to the cut-off, a constant rate beyond.
 
     Acts on relative rates, where the matrix is closest to its diagonal.
+
+    Parameters
+    ----------
+    reduced
+        Guideway in component coordinates.
+    bearings : (coordinate, coordinate)
+        Damping of the bearings.
+    cutoff
+        Frequency up to which it is a share of critical [Hz].
     """
     mass = reduced.mass.toarray()
     squares, shapes = scipy.linalg.eigh(reduced.stiffness.toarray(), mass)
@@ -560,7 +569,7 @@ def _relative_damping(
     return _pruned(sp.csr_array((relative + relative.T) / 2), DAMPING_DROP)
 
 
-def _rail_nodes_rows(
+def rail_nodes_rows(
     model: full.GuidewayModel, span: int
 ) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
     """Rows (coefficient, dof) that read z, roll and y at the nodes of a span's rails."""
@@ -600,7 +609,7 @@ def _rest_at_midspan(
     for row in model.girder_rows(at):
         here = row[:, dof].toarray().ravel()
         rests.append(factors.solve(here) - shapes @ (shapes.T @ here / square))
-    z, roll, y = (rows[:, dof] for rows in _rail_nodes_rows(model, middle))
+    z, roll, y = (rows[:, dof] for rows in rail_nodes_rows(model, middle))
     return z @ rests[0], roll @ rests[1], y @ rests[1]
 
 
@@ -612,4 +621,4 @@ def _rail_pieces(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Coefficients (column, coefficient) of the rails' z, roll and y along one span."""
     shapes = basis[:, columns].toarray()
-    return tuple((rows @ shapes).T for rows in _rail_nodes_rows(model, span))
+    return tuple((rows @ shapes).T for rows in rail_nodes_rows(model, span))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
@@ -61,13 +62,18 @@ def guideway_limit(config: Config, reduced: ReducedGuideway, time_step: float) -
         Δt [s], on which the mass of a step depends.
     """
     ratio = config.guideway.damping_ratio
-    inertia = stepped_inertia(reduced, time_step)
-    square = scipy.linalg.eigvalsh(stepped_stiffness(reduced), inertia)[-1]
+    square = fastest_square(reduced, time_step)
     fastest = math.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes].max(initial=1e-12))
     return min(
-        GUIDEWAY_MARGIN * _largest_phase(ratio) / math.sqrt(square),
-        _largest_phase(DAMPING_MARGIN * ratio, exact=True) / fastest,
+        GUIDEWAY_MARGIN * largest_phase(ratio) / math.sqrt(square),
+        largest_phase(DAMPING_MARGIN * ratio, exact=True) / fastest,
     )
+
+
+def fastest_square(reduced: ReducedGuideway, time_step: float) -> float:
+    """Largest squared circular frequency of the guideway with the mass of a step [1/s²]."""
+    inertia = stepped_inertia(reduced, time_step)
+    return float(scipy.linalg.eigvalsh(stepped_stiffness(reduced), inertia)[-1])
 
 
 def train_parts(config: Config) -> tuple[Block, ...]:
@@ -364,7 +370,8 @@ def step_matrix(block: Block, gains: FloatArray, time_step: float) -> FloatArray
     return np.concatenate([new_x, new_v, acceleration, a, *memories])
 
 
-def _largest_phase(ratio: float, *, exact: bool = False) -> float:
+@lru_cache(maxsize=256)
+def largest_phase(ratio: float, *, exact: bool = False) -> float:
     """Largest stable ωΔt of an oscillator with this damping ratio [-].
 
     ``exact`` takes it as a component mode, which is stepped with its response and damping.
