@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from maglev import datasets, profiles
 from maglev.arrays import FloatArray, IntArray
-from maglev.errors import UserError
+from maglev.errors import StepTooLarge, UserError
 from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
@@ -27,6 +27,7 @@ from maglev.mechanics.responses import (
     Passages,
     checked_gains,
     in_their_order,
+    not_judged,
 )
 from maglev.mechanics.varied import beyond_the_basis, checked_values, cost_of, equal_samples
 from maglev.parameters import Config
@@ -151,10 +152,15 @@ def simulate(
 
 @dataclass(frozen=True)
 class _Group:
-    """Samples that share a system: their numbers, its configuration, what else each has its own."""
+    """Samples that share a system.
+
+    Their numbers, its configuration, whether that is not the one given, and what else each has of
+    its own.
+    """
 
     rows: IntArray
     config: Config
+    anew: bool
     own: tuple[str, ...]
 
 
@@ -180,7 +186,8 @@ def _groups(
         numbers = {key: float(values[key][rows[0]]) for key in [*built, *whole]}
         place = f"sample {rows[0]}: "
         of_group = config.with_numbers(numbers, place) if numbers else config
-        found.append(_Group(rows, of_group, tuple(key for key in own if key not in whole)))
+        rest = tuple(key for key in own if key not in whole)
+        found.append(_Group(rows, of_group, bool(numbers), rest))
     return found
 
 
@@ -217,8 +224,14 @@ def _run(
         return passages, effort.attributes
     step = course(config).time_step
     every = max(1, int(HISTORY_INTERVAL / step * (1 + 1e-9))) if histories else 0
+    try:
+        system = _system(config, _track_file_hash(config))
+    except StepTooLarge:
+        if not group.anew or histories:  # the configuration's own step, or no histories to give
+            raise
+        return not_judged(rows.size, config.train.n_cars), {}
     passages = integrate.integrate(
-        _system(config, _track_file_hash(config)),
+        system,
         gains[rows],
         values={key: values[key][rows] for key in group.own},
         profile_of=None if seeds is None else _tracks_of(config, [seeds[k] for k in rows]),

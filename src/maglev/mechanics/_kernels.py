@@ -233,35 +233,6 @@ def _advance_guideway(stretches, stretch, dt, guideway):
 
 
 @kernel()
-def _damp_bearings(spans, stretch, guideway):
-    """Put the forces of the bearings' dampers on the coordinates of spans that are awake."""
-    velocity, force = guideway.predicted, guideway.force
-    none = load(force, 0) * 0.0
-    n_columns = spans.damped.shape[1]
-    for span in range(spans.n_spans):
-        if not spans.stretches.awake[stretch, span]:
-            continue
-        at, place, even = n_columns * span, spans.damper_start[span], spans.n_even[span]
-        for family in range(2):
-            first, last = (0, even) if family == 0 else (even, n_columns)
-            width = last - first
-            for _ in range(12):
-                rate, more = none, none
-                for k in range(0, width - 1, 2):  # two sums: neither waits for the other
-                    i, j = entry(spans.damped, at + first + k), entry(spans.damped, at + first + k + 1)
-                    rate = fma(load(velocity, i), own(spans.damper, place + k), rate)
-                    more = fma(load(velocity, j), own(spans.damper, place + k + 1), more)
-                if width % 2 == 1:
-                    i = entry(spans.damped, at + last - 1)
-                    rate = fma(load(velocity, i), own(spans.damper, place + width - 1), rate)
-                rate = none - (rate + more)
-                for k in range(width):
-                    i = entry(spans.damped, at + first + k)
-                    store(force, i, fma(rate, own(spans.damper, place + k), load(force, i)))
-                place += width
-
-
-@kernel()
 def _answer(spans, stretch, scaled, guideway):
     """Turn the forces on the coordinates that are stepped into accelerations, in place."""
     x, velocity, force = guideway.position, guideway.predicted, guideway.force
@@ -273,8 +244,6 @@ def _answer(spans, stretch, scaled, guideway):
     )
     none = load(force, 0) * 0.0
     damping, column = spans.damping, spans.damping_column
-    if has_rows(spans.damper):
-        _damp_bearings(spans, stretch, guideway)
     if has_rows(spans.damping_root):
         velocity = scaled
         for n in range(start, stop):

@@ -172,7 +172,6 @@ class Stretches(NamedTuple):
     factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal, own likewise
     stilled_start: np.ndarray  # (stretch + 1,) coordinates that the stretch before stepped
     stilled: np.ndarray
-    awake: np.ndarray  # (stretch, span) whether all of a span is stepped
 
 
 class Spans(NamedTuple):
@@ -184,8 +183,6 @@ class Spans(NamedTuple):
     Where samples have guideways of their own, the rails' shapes are those of a basis that all
     share, the same for each span, and a sample's coordinates change to it: ``change`` holds the
     matrix (upright of the basis, upright), then (sideways of the basis, sideways), row by row.
-    Their bearings damp on their own: ``damper`` holds the stretch of twelve, times the root of what
-    they damp, per unit of each even coordinate of a span, then of each odd one, row by row.
     """
 
     n_spans: int
@@ -212,10 +209,6 @@ class Spans(NamedTuple):
     damping: np.ndarray
     damping_root: np.ndarray  # (coordinate,) factors on row and column; own by root_number
     root_number: np.ndarray
-    damper: np.ndarray  # (0,) none; own (damper column, LANES): see below
-    damper_start: np.ndarray  # (span,) where a span's dampers begin
-    damped: np.ndarray  # (span, column) coordinates that stretch its bearings; even ones first
-    n_even: np.ndarray  # (span,) how many of these are even
     taken_mode: np.ndarray  # the same as carried by pier tops, in rows that the stretches name
     taken: np.ndarray  # own by taken_number
     taken_number: np.ndarray

@@ -293,7 +293,7 @@ def make_basis(guideway: Guideway, keys: Sequence[str], cutoff: float) -> Basis:
     variants = [
         with_arrays(guideway, {key: guideway_number(guideway, key) * times})
         for key in keys
-        if not key.endswith(("damping_ratio", "damping"))
+        if key != "damping_ratio"
         for times in ends_of(key)
     ]
     models = [full.build(one.model_copy(update={"n_spans": 1})) for one in variants]

@@ -10,7 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from maglev.arrays import BoolArray, FloatArray, IntArray
-from maglev.errors import UserError
+from maglev.errors import StepTooLarge, UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import packing
 from maglev.mechanics import train as train_model
@@ -63,7 +63,6 @@ class System:
     """Train, guideway, magnets and track as arrays for the kernels."""
 
     train: train_model.TrainModel
-    guideway: guideway_model.GuidewayModel
     reduced: ReducedGuideway
     vehicle: Vehicle
     suspension: MagnetRows
@@ -100,8 +99,10 @@ def prepare(config: Config, profile: Profile) -> System:
 
     Raises
     ------
+    StepTooLarge
+        If the time step exceeds the stability limit.
     UserError
-        If the time step exceeds the stability limit or the profile does not cover the passage.
+        If the profile does not cover the passage.
     """
     train = train_model.build(config.train)
     guideway = guideway_model.build(config.guideway)
@@ -123,7 +124,6 @@ def prepare(config: Config, profile: Profile) -> System:
     tracks = packing.tracks(config, grounds, [profile])
     return System(
         train=train,
-        guideway=guideway,
         reduced=reduced,
         vehicle=packing.vehicle(train),
         suspension=suspension,
@@ -140,6 +140,7 @@ def prepare(config: Config, profile: Profile) -> System:
     )
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def integrate(
     system: System,
     gains: FloatArray,
@@ -262,11 +263,7 @@ def _batch(
     of_guideway = tuple(key for key in values if key.startswith("guideway."))
     others = tuple(key for key in values if key not in of_guideway)
     shape = shape_of(config, system.train, kinds, others) if values else None
-    frame = (
-        frame_of(config, system.guideway, system.reduced, system.spans, of_guideway)
-        if of_guideway
-        else None
-    )
+    frame = frame_of(config, of_guideway) if of_guideway else None
     return _Batch(
         system,
         gains,
@@ -399,7 +396,7 @@ def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ..
     if not step_holds(parts, gains, dt):
         limit = min(limit, train_limit(parts, gains))
     if not dt < limit:
-        raise UserError(
+        raise StepTooLarge(
             f"passage.time_step must be below the stability limit of {limit * 1e3:.3g} ms, "
             f"got {dt * 1e3:.3g} ms; take a smaller step or lower passage.mode_cutoff"
         )

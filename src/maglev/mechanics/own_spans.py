@@ -8,19 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
+from threadpoolctl import threadpool_limits
 
 from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.mechanics import packing
 from maglev.mechanics._records import Spans
 from maglev.mechanics.activity import Stretch, stepped_mass, stretches
 from maglev.mechanics.course import course
-from maglev.mechanics.guideway import GuidewayModel
+from maglev.mechanics.guideway import GuidewayModel, build
 from maglev.mechanics.guideways import FAMILIES, Basis, Piece, make_basis
 from maglev.mechanics.own import aligned
-from maglev.mechanics.packing import whole_and_short
-from maglev.mechanics.reduction import ReducedGuideway
+from maglev.mechanics.reduction import ReducedGuideway, reduce
 from maglev.mechanics.step_limit import (
     DAMPING_MARGIN,
     GUIDEWAY_MARGIN,
@@ -103,8 +105,8 @@ class Frame:
 class Numbers:
     """A sample's own numbers for `Spans`, flat, and what the mean's are compared by.
 
-    ``structure`` is the diagonal of the structure's damping, of modes and tops, up to a factor that
-    all samples share.
+    ``structure`` and ``bearing`` are the diagonals of damping by the structure and by the bearings,
+    of modes and tops, the former up to a factor that all samples share.
     """
 
     change: FloatArray
@@ -115,10 +117,10 @@ class Numbers:
     factor: FloatArray
     factor_inverse: FloatArray
     root: FloatArray
-    damper: FloatArray
     midspan: FloatArray
     rest: FloatArray
     structure: FloatArray
+    bearing: FloatArray
     tops: float  # largest squared circular frequency of the tops alone [1/s²]
     slowed: float  # share of Δt² of their stiffness added to the mass of the tops [-]
     holds: bool  # whether the step does
@@ -129,22 +131,21 @@ MOST_SLOWED = 0.08
 it lowers a frequency of 60 Hz by 0.2 % at the default step."""
 
 
-def frame_of(
-    config: Config,
-    model: GuidewayModel,
-    reduced: ReducedGuideway,
-    spans: Spans,
-    keys: Sequence[str],
-) -> Frame:
+@lru_cache(maxsize=2)
+@threadpool_limits.wrap(limits=1, user_api="blas")
+def frame_of(config: Config, keys: tuple[str, ...]) -> Frame:
     """Find what guideways have in common that differ in the numbers at some keys.
 
     Parameters
     ----------
-    config, model, reduced, spans
+    config
         The mean.
     keys
         Dotted keys of the configuration.
     """
+    model = build(config.guideway)
+    reduced = reduce(model, config.passage.mode_cutoff, config.passage.mode_cutoff_elsewhere)
+    spans = packing.spans(reduced, config)
     passage = config.passage
     cutoff = max(passage.mode_cutoff, passage.mode_cutoff_elsewhere)
     of_guideway = [key.removeprefix("guideway.") for key in keys]
@@ -294,7 +295,7 @@ def numbers_of(frame: Frame, guideway: Guideway) -> Numbers:
         factor=factor,
         factor_inverse=inverse,
         root=np.ones(0),
-        damper=_dampers(frame, guideway, spans),
+        bearing=_by_bearings(frame, guideway, spans),
         midspan=_midspan(frame, sides),
         rest=_rest(frame, spans),
         structure=structure,
@@ -429,24 +430,24 @@ def _rest(frame: Frame, spans: Pieces) -> FloatArray:
     )
 
 
-def _damped(frame: Frame, kind: int) -> tuple[IntArray, IntArray]:
-    """Even and odd own modes of a kind of span."""
-    family = frame.kinds[kind].family
-    return np.flatnonzero(family == 0), np.flatnonzero(family == 1)
-
-
-def _dampers(frame: Frame, guideway: Guideway, spans: Pieces) -> FloatArray:
-    """Stretch of the bearings of a span, times the root of their damping, of both kinds."""
-    found = []
-    for kind in (0, 1):
-        for family, own in enumerate(_damped(frame, kind)):
-            one, ends = spans[family], frame.basis.ends[family]
-            n = one.shape.shape[0]
-            rows = ends.reshape(-1, ends.shape[2])
-            modes = rows[:, :n] @ one.shape[:, frame.kinds[kind].place[own]]
-            tops = rows[:, :n] @ one.constraint + rows[:, n:]
-            found.append(np.hstack([modes, tops]).ravel())
-    return np.sqrt(guideway.bearing.damping) * np.concatenate(found)
+def _by_bearings(frame: Frame, guideway: Guideway, spans: Pieces) -> FloatArray:
+    """Diagonal of the damping by the bearings, of modes of all kinds and of the tops."""
+    n_spans = guideway.n_spans
+    modes, tops = [], np.zeros(12)
+    for one, ends, places in zip(spans, frame.basis.ends, SPAN_TOPS, strict=True):
+        n = one.shape.shape[0]
+        rows = ends.reshape(-1, ends.shape[2])
+        modes.append(np.square(rows[:, :n] @ one.shape).sum(axis=0))
+        tops[places] = np.square(rows[:, :n] @ one.constraint + rows[:, n:]).sum(axis=0)
+    whole = np.zeros(6 * (n_spans + 1))
+    for span in range(n_spans):
+        whole[6 * span : 6 * span + 12] += tops
+    of_kinds = [
+        np.array([modes[f][k] for f, k in zip(kind.family, kind.place, strict=True)])
+        for kind in frame.kinds[:2]
+    ]
+    nothing = np.zeros(frame.kinds[2].family.size)
+    return guideway.bearing.damping * np.concatenate([*of_kinds, nothing, whole])
 
 
 def _roots(frame: Frame, own: Numbers, phase: FloatArray) -> FloatArray:
@@ -454,7 +455,15 @@ def _roots(frame: Frame, own: Numbers, phase: FloatArray) -> FloatArray:
     mean = frame.mean
     if mean is None:
         return np.ones(own.structure.size)
-    share = np.where(mean.structure > 0, own.structure / np.maximum(mean.structure, 1e-300), 1.0)
+    reduced = frame.reduced
+    diagonal = reduced.relative_damping.diagonal()
+    of_mean = np.zeros(own.structure.size)
+    of_mean[_mode_numbers(frame)] = diagonal[: reduced.n_modes]
+    of_mean[own.square.size :] = diagonal[reduced.n_modes :]
+    structure = np.maximum(of_mean - mean.bearing, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(mean.structure > 0, own.structure / mean.structure, 1.0)
+        share = np.where(of_mean > 0, (structure * ratio + own.bearing) / of_mean, 1.0)
     n, dt = own.square.size, course(frame.config).time_step
     share[:n] *= np.sinc(np.sqrt(mean.square) * dt / np.pi) / np.sinc(phase / np.pi)
     return np.sqrt(share)
@@ -485,7 +494,7 @@ def _record(frame: Frame, mean: Numbers) -> Spans:
     top = spans.carried_top - reduced.n_modes
     number_of[row, top] = carried
     always = np.logical_and.reduce([stretch.stepped for stretch in frame.of_passage])
-    both = whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
+    both = packing.whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
     taken_row = np.repeat(np.arange(2 * n_tops), np.diff(both.indptr))
     taken = number_of[spans.taken_mode, taken_row % n_tops]
     even, odd = frame.basis.rail[0].shape[0], frame.basis.rail[1].shape[0]
@@ -493,18 +502,6 @@ def _record(frame: Frame, mean: Numbers) -> Spans:
     first = 0 if alike else even * frame.upright[0].size + odd * frame.sideways[0].size
     widest = int(np.diff(spans.upright_start).max() + np.diff(spans.sideways_start).max())
     entries = max(mean.factor.size, 2 * widest + even + odd)
-    sets = [_damped(frame, 1 if span == middle else 0) for span in range(n_spans)]
-    damped = [
-        np.concatenate(
-            [
-                reduced.own_modes(span)[even_ones],
-                reduced.n_modes + 6 * span + SPAN_TOPS[0],
-                reduced.own_modes(span)[odd_ones],
-                reduced.n_modes + 6 * span + SPAN_TOPS[1],
-            ]
-        )
-        for span, (even_ones, odd_ones) in enumerate(sets)
-    ]
     return spans._replace(
         rail_z=np.ascontiguousarray(frame.basis.rail[0]),
         rail_roll=np.ascontiguousarray(frame.basis.rail[1]),
@@ -514,12 +511,6 @@ def _record(frame: Frame, mean: Numbers) -> Spans:
         carried_number=carried,
         root_number=np.concatenate([mode, mean.square.size + np.arange(n_tops)]),
         taken_number=taken,
-        damping_column=frame.damping[1],
-        damping=frame.damping[2],
-        damped=damped_table,
-        n_even=np.array([6 + even_ones.size for even_ones, _ in sets]),
-        damper_start=np.array([first_damper if span == middle else 0 for span in range(n_spans)]),
-        stretches=stretches_of(frame),
         stiffness_number=np.arange(mean.stiffness.size),
         in_order=np.arange(entries),
     )

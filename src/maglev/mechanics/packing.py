@@ -382,10 +382,6 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
         damping=damping,
         damping_root=np.zeros(0),
         root_number=_SHARED,
-        damper=np.zeros(0),
-        damper_start=_SHARED,
-        damped=np.zeros((0, 0), dtype=np.int64),
-        n_even=_SHARED,
         taken_mode=taken_mode,
         taken=taken,
         taken_number=_SHARED,
@@ -436,7 +432,7 @@ def _stretches(
 
     With the ends of their rows, whole or short, of damping and of modes carried by pier tops.
     """
-    n, n_spans = reduced.n_modes, reduced.parameters.n_spans
+    n = reduced.n_modes
     dt = course(config).time_step
     starts, tops_from, stepped, rows = [0], [], [], []
     factor_rows, factor_start, inverse = [], [0], []
@@ -477,12 +473,6 @@ def _stretches(
         factor_inverse=np.concatenate(inverse),
         stilled_start=np.cumsum([0, *(one.size for one in stilled)]),
         stilled=np.concatenate(stilled),
-        awake=np.array(
-            [
-                [stretch.stepped[reduced.own_modes(span)].all() for span in range(n_spans)]
-                for stretch in of_passage
-            ]
-        ),
     )
 
 

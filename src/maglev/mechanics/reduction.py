@@ -460,7 +460,7 @@ def reduce(
     rest_z, rest_roll, rest_y = _rest_at_midspan(model, reduced)
     return replace(
         reduced,
-        relative_damping=relative_damping(reduced, bearings, cutoff),
+        relative_damping=_relative_damping(reduced, bearings, cutoff),
         rest_z=rest_z,
         rest_roll=rest_roll,
         rest_y=rest_y,
@@ -541,21 +541,12 @@ def _pruned_to(matrix: sp.csr_array, drop: float) -> sp.csr_array:
     return sp.csr_array((coo.data[keep], (coo.row[keep], coo.col[keep])), shape=matrix.shape)
 
 
-def relative_damping(
+def _relative_damping(
     reduced: ReducedGuideway, bearings: FloatArray, cutoff: float
 ) -> sp.csr_array:
     """Damping: a given share of critical up to the cut-off, a constant rate beyond.
 
     Acts on relative rates, where the matrix is closest to its diagonal.
-
-    Parameters
-    ----------
-    reduced
-        Guideway in component coordinates.
-    bearings : (coordinate, coordinate)
-        Damping of the bearings.
-    cutoff
-        Frequency up to which it is a share of critical [Hz].
     """
     mass = reduced.mass.toarray()
     squares, shapes = scipy.linalg.eigh(reduced.stiffness.toarray(), mass)

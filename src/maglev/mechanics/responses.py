@@ -11,6 +11,7 @@ import numpy.typing as npt
 from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.parameters import Passage
+from maglev.vocabulary import STEP_TOO_LARGE
 
 GIRDER_RESPONSES = (
     "girder_displacement_z",
@@ -68,6 +69,27 @@ class Passages:
     body_y_history: FloatArray
     gap_history: FloatArray
     current_history: FloatArray
+
+
+def not_judged(n_samples: int, n_cars: int) -> Passages:
+    """Passages without histories of a system for which the step is too large."""
+    of_car, of_kind, alone = (np.full((n_samples, *more), np.nan) for more in ((n_cars,), (2,), ()))
+    none = np.empty((n_samples, 0, 0))
+    return Passages(
+        girder=np.full((n_samples, 4), np.nan),
+        girder_time=np.full((n_samples, 4), np.nan),
+        **dict.fromkeys(("body_z", "body_y", "body_z_time", "body_y_time"), of_car),
+        **dict.fromkeys(("gap_min", "gap_max", "current_max"), of_kind),
+        status=np.full(n_samples, STEP_TOO_LARGE),
+        lost_time=alone,
+        lost_magnet=np.full(n_samples, -1),
+        time=np.empty(0),
+        girder_history=none,
+        body_z_history=none,
+        body_y_history=none,
+        gap_history=none,
+        current_history=none,
+    )
 
 
 def in_their_order(parts: Sequence[Passages], rows: Sequence[IntArray]) -> Passages:

@@ -76,7 +76,6 @@ GUIDEWAY = (
     "bearing.lateral_stiffness",
     "bearing.fixed_longitudinal_stiffness",
     "bearing.free_longitudinal_stiffness",
-    "bearing.damping",
     "pier.width_x",
     "pier.width_y",
     "pier.cap_width_y",
