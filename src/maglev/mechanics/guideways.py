@@ -28,7 +28,7 @@ from maglev.parameters import BeamSection, Guideway
 FAMILIES = (np.array([X, Z, PITCH]), np.array([Y, ROLL, YAW]))
 """Motions of a node that are even, and that are odd, from side to side."""
 
-TOLERANCE = 0.3
+TOLERANCE = 0.1
 """Share of a shape at an end, beyond the modes and static shapes of the mean and by the root of its
 kinetic energy, that the basis may leave out [-]; assumed, checked in the tests."""
 

@@ -266,7 +266,7 @@ def numbers_of(frame: Frame, guideway: Guideway) -> Numbers:
         kinds[2].share(piers, FAMILIES),
     ]
     square = np.concatenate(squares)
-    stiffness, mass = _tops(frame, spans, piers, shares)
+    stiffness, mass, carried = _tops(frame, spans, piers, shares)
     tops = _fastest(stiffness, mass + dt**2 / 12 * stiffness)
     slowed, holds = _slowed(frame, tops, float(square.max()), guideway.damping_ratio)
     factor, inverse = _factors(frame, mass + (1 / 12 + slowed) * dt**2 * stiffness, shares)
@@ -276,7 +276,7 @@ def numbers_of(frame: Frame, guideway: Guideway) -> Numbers:
     structure = guideway.damping_ratio * np.concatenate(
         [
             np.sqrt(np.minimum(square, limit)),
-            np.sqrt(np.maximum(stiffness.diagonal() * mass.diagonal(), 0.0)),
+            np.sqrt(np.maximum(stiffness.diagonal() * carried, 0.0)),
         ]
     )
     row, column = _pattern(frame)
@@ -345,10 +345,11 @@ def _pattern(frame: Frame) -> tuple[IntArray, IntArray]:
 
 def _tops(
     frame: Frame, spans: Pieces, piers: Pieces, shares: Sequence[FloatArray]
-) -> tuple[FloatArray, FloatArray]:
-    """Stiffness and mass (top, top) of the pier tops, modes at rest."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Stiffness and mass (top, top) of the pier tops, modes at rest; all that a top carries."""
     n_spans = frame.config.guideway.n_spans
     stiffness, mass = np.zeros((2, 6 * (n_spans + 1), 6 * (n_spans + 1)))
+    carried = np.zeros(6 * (n_spans + 1))
     blocks = []
     for pieces, tops in ((spans, SPAN_TOPS), (piers, FAMILIES)):
         n = sum(one.size for one in tops)
@@ -362,11 +363,13 @@ def _tops(
         share = shares[1 if span == n_spans // 2 else 0]
         stiffness[at, at] += blocks[0][0]
         mass[at, at] += blocks[0][1] - share.T @ share
+        carried[at] += blocks[0][1].diagonal()
     for pier in range(n_spans + 1):
         at = slice(6 * pier, 6 * pier + 6)
         stiffness[at, at] += blocks[1][0]
         mass[at, at] += blocks[1][1] - shares[2].T @ shares[2]
-    return stiffness, mass
+        carried[at] += blocks[1][1].diagonal()
+    return stiffness, mass, carried
 
 
 def _factors(

@@ -7,6 +7,7 @@ share one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
@@ -47,9 +48,9 @@ LEVELS = ("coefficient", "roughness")
 """Factors of a spectrum: the irregularity goes with their root."""
 
 
-ENDS = {"bearing": (0.25, 4.0), "": (0.6, 1.6)}
-"""Multiples of the configured number that the basis is good for: of bearings, of all others [-];
-assumed, checked in the tests."""
+ENDS = {"damping_ratio": (0.0, math.inf), "bearing": (0.25, 4.0), "": (0.6, 1.6)}
+"""Multiples of the configured number that the basis is good for: of the damping, which changes no
+shape, of bearings, of all others [-]; assumed, checked in the tests."""
 
 _OF_A_SECTION = (
     "elastic_modulus",
@@ -89,7 +90,7 @@ GUIDEWAY = (
 
 def ends_of(key: str) -> tuple[float, float]:
     """Smallest and largest multiple of a number of the guideway that the basis is good for [-]."""
-    return ENDS["bearing" if key.startswith("bearing.") else ""]
+    return next(ends for name, ends in ENDS.items() if key.startswith(name))
 
 
 def cost_of(config: Config, keys: Iterable[str]) -> dict[str, Cost]:
