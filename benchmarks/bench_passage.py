@@ -1030,7 +1030,7 @@ def page(results: Results, sizes: Sizes) -> str:
                     )
                 ),
                 [
-                    f"{PASSAGES:,} passages, 12 numbers of their own, 2 cores",
+                    f"{N_PASSAGES:,} passages, 12 numbers of their own, 2 cores",
                     f"{twelve / 60:.1f} min wall, projected",
                     f"≤ {TARGET_TWELVE:g} min",
                     judged(twelve / 60, TARGET_TWELVE, least=False),

@@ -9,29 +9,16 @@ from maglev import datasets
 from maglev.mechanics.course import course, track_range
 from maglev.parameters import Config
 from maglev.simulation import simulate
-
-MEAN = np.array(Config().gains.as_row)
+from passages import MEAN, half_size
 
 
 def small(n_cars=1, n_spans=1, irregularity=None, **passage):
-    """Cars half as long as the real ones on spans half as long."""
-    return Config.model_validate(
-        {
-            "train": {
-                "n_cars": n_cars,
-                "car_pitch": "12.384 m",
-                "bogie": {"c_frame_spacing": "1.548 m"},
-                "suspension_magnet": {"n_poles": 6, "pole_pitch": "0.258 m"},
-                "guidance_magnet": {"n_poles": 2, "pole_pitch": "0.774 m", "preload": "10 kN"},
-            },
-            "guideway": {
-                "n_spans": n_spans,
-                "span_length": "12.384 m",
-                "rail": {"units_per_span": 4},
-            },
-            "irregularity": {"fade_in": "5 m"} | (irregularity or {}),
-            "passage": {"approach": "5 m"} | passage,
-        }
+    """Half size, with what tests vary."""
+    return half_size(
+        train={"n_cars": n_cars},
+        guideway={"n_spans": n_spans},
+        irregularity=irregularity or {},
+        passage=passage,
     )
 
 

@@ -43,7 +43,7 @@ highest frequency in the band of the responses."""
 def simulate(
     config: Config,
     gains: npt.ArrayLike,
-    histories: bool = False,
+    histories: bool | Literal["responses"] = False,
     solver: Literal["production", "reference"] = "production",
     *,
     values: Mapping[str, npt.ArrayLike] | None = None,
@@ -63,7 +63,8 @@ def simulate(
         Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m]; then suspension k_a
         [A s²/m], k_i [A/(m s)], guidance k_a, k_i, those of ``config.gains`` if left out.
     histories
-        Whether to keep the time series of responses, gaps and currents.
+        Whether to keep the time series of responses, gaps and currents; ``"responses"``: without
+        gaps and currents, which are most of their size.
     solver
         ``"production"``: compiled, many samples at once; ``"reference"``: full finite elements with
         a step of its own, halved until the extremes are right to 0.1 %, some thousand times slower.
@@ -95,9 +96,9 @@ def simulate(
     UserError
         If the gains have another shape or are not finite, the time step exceeds the stability
         limit, the irregularity does not cover the passage, the solver is unknown, the seeds are
-        not whole numbers from zero, one for each sample of the production solver, or a value is of
-        no number of the configuration, or will not do for it, or the
-        reference solver does not reach its accuracy.
+        not whole numbers from zero, one for each sample of the production solver, a value is of no
+        number of the configuration, or will not do for it, or the reference solver does not reach
+        its accuracy.
     FileNotFoundError
         If the irregularity's file does not exist.
 
@@ -119,6 +120,8 @@ def simulate(
     'completed'
     """
     gains = checked_gains(gains, config.gains.further)
+    if histories not in (False, True, "responses"):
+        raise UserError(f"histories must be False, True or 'responses', got {histories!r}")
     if solver not in ("production", "reference"):
         raise UserError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
@@ -191,7 +194,7 @@ def _groups(
     return found
 
 
-def _refuse_unequal_histories(groups: Sequence[_Group], histories: bool) -> None:
+def _refuse_unequal_histories(groups: Sequence[_Group], histories: bool | str) -> None:
     """Refuse histories of samples whose steps or magnets are not the same."""
     ways = {(course(one.config).time_step, course(one.config).n_steps) for one in groups}
     trains = {one.config.train.n_cars for one in groups}
@@ -206,7 +209,7 @@ def _run(
     group: _Group,
     gains: FloatArray,
     values: Mapping[str, FloatArray],
-    histories: bool,
+    histories: bool | str,
     solver: str,
     seeds: list[int] | None,
     n_threads: int,
@@ -236,6 +239,7 @@ def _run(
         values={key: values[key][rows] for key in group.own},
         profile_of=None if seeds is None else _tracks_of(config, [seeds[k] for k in rows]),
         record_every=every,
+        with_magnets=histories != "responses",
         n_threads=n_threads,
         on_progress=on_progress,
     )
@@ -332,7 +336,7 @@ def _system(config: Config, _track_file: str) -> integrate.System:
 
 
 def _dataset(
-    groups: Sequence[_Group], gains: FloatArray, passages: Passages, histories: bool
+    groups: Sequence[_Group], gains: FloatArray, passages: Passages, histories: bool | str
 ) -> xr.Dataset:
     one, config = ("sample",), groups[0].config
     ways = [course(group.config) for group in groups]
@@ -366,6 +370,8 @@ def _dataset(
         of_car = ("sample", "car", "t")
         variables["car_body_acceleration_z_history"] = (of_car, passages.body_z_history)
         variables["car_body_acceleration_y_history"] = (of_car, passages.body_y_history)
+        coordinates |= {"t": passages.time}
+    if histories and histories != "responses":
         of_magnet = ("sample", "magnet", "t")
         variables["gap_history"] = (of_magnet, passages.gap_history)
         variables["current_history"] = (of_magnet, passages.current_history)
@@ -373,7 +379,7 @@ def _dataset(
         variables["magnet_kind"] = (("magnet",), magnets.is_guidance.astype(np.int8))
         variables["magnet_side"] = (("magnet",), magnets.side)
         variables["magnet_x"] = (("magnet",), magnets.x)
-        coordinates |= {"magnet": np.arange(magnets.x.size), "t": passages.time}
+        coordinates |= {"magnet": np.arange(magnets.x.size)}
     return xr.Dataset(
         variables,
         coords=coordinates,

@@ -17,10 +17,30 @@ Response = Literal[
     "car_body_acceleration_z",
     "car_body_acceleration_y",
 ]
-"""A response whose extreme a passage is judged by."""
+"""A response; its extreme is the result of a passage."""
 
 RESPONSES: tuple[Response, ...] = get_args(Response)
-"""The responses in the order of ``response`` in files and arrays."""
+"""The responses in the order in which they are shown."""
+
+PAPER_RESPONSES: tuple[Response, ...] = (
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+    "car_body_acceleration_z",
+    "car_body_acceleration_y",
+)
+"""The responses that the paper judges a passage by."""
+
+RecordedResponse = Literal[
+    "girder_displacement_z",
+    "girder_displacement_y",
+    "girder_acceleration_z",
+    "girder_acceleration_y",
+    "car_body_acceleration_z",
+    "car_body_acceleration_y",
+]
+"""A response whose history is recorded."""
 
 _GIRDER = "of the girder at midspan of the middle span"
 _CAR = "of the car body, largest over the cars"
@@ -59,14 +79,14 @@ GAIN_UNITS: Mapping[str, str] = {
 """Unit of each gain in the notation of UDUNITS."""
 
 Method = Literal["mcm", "osm", "asm_paper", "asm"]
-"""How the runs of a case are chosen: plain Monte Carlo, one-stage set, adaptive as published,
+"""Choice of the runs of a case: plain Monte Carlo, one-stage set, adaptive as published,
 adaptive towards the limits."""
 
 METHODS: tuple[Method, ...] = get_args(Method)
 """The methods in the order in which they are shown."""
 
 BASELINE: Method = "mcm"
-"""The method whose runs are the baseline that others are judged by."""
+"""The method whose runs are the baseline, to which others are compared."""
 
 DESIGNED: tuple[Method, ...] = tuple(name for name in METHODS if name != BASELINE)
 """The methods that make a design and predict by a surrogate."""
@@ -81,13 +101,13 @@ SURROGATES: tuple[Surrogate, ...] = get_args(Surrogate)
 """The kinds of surrogate."""
 
 STATUS = {0: "completed", 1: "contact", 2: "gap_lost", 3: "not_finite", 4: "step_too_large"}
-"""How a passage ended: levitated throughout, why it stopped, or that it was not judged."""
+"""End of a passage: completed, lost in one of three ways, or not judged."""
 
 STEP_TOO_LARGE = 4
 """Status of a passage that was not judged: its gains need a smaller step."""
 
 Group = Literal["pole", "ends", "half", "lumped"]
-"""Who shares a circuit of the control."""
+"""Sharing of a circuit of the control among poles."""
 
 GROUPS: tuple[Group, ...] = get_args(Group)
 """The groups in the order in which they are shown."""
@@ -103,7 +123,7 @@ TRAIN_PARTS = (
     "suspension_magnets",
     "guidance_magnets",
 )
-"""What moves in a mode of the train."""
+"""Part of the train that moves in a mode."""
 
 DECISIONS = (
     "go_on",
@@ -111,18 +131,25 @@ DECISIONS = (
     "limits_settled",
     "largest_number_of_runs",
 )
-"""What is decided after a round of an adaptive design."""
+"""Decision after a round of an adaptive design."""
 
 GIVEN, TOO_FEW, INFINITE = LIMIT_STATUS = ("given", "too_few_exceedances", "infinite")
-"""What can be said of a limit: its value; that the sample does not carry it; that losses alone are
-likelier than the failure probability, so that none is finite."""
+"""Status of a limit: given; too few exceedances in the sample; infinite, because losses alone are
+likelier than the failure probability."""
 
 DENSITY_METHODS = ("gdee", "gdee_of_the_logarithm", "direct")
-"""How a density was found: by the GDEE; by the GDEE of the logarithm of the extreme, where strays
-ask for too fine a mesh; directly, where there is no GDEE or it refused both."""
+"""Method of a density: the GDEE; the GDEE of the logarithm of the extreme, where strays need too
+fine a mesh; direct, where there is no GDEE or it refused both."""
+
+BARRIER_SOURCES = ("limit", "mean_and_deviations")
+"""What a barrier of the first passage is: the limit of the extreme at the failure probability; or,
+where none is given, its mean and as many deviations as a normal variate has at that probability."""
 
 SOURCES = ("paper", "ours")
-"""Whose number stands there."""
+"""Source of a number."""
+
+LOST = "lost"
+"""The limit state that is always there: levitation is lost."""
 
 TRACK_PARTS = ("gains_only", "track_only", "other_track", "other_gains")
 """Further runs of a case whose baseline has gains i on track i: gains i on the configured track;

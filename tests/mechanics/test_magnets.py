@@ -10,14 +10,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from maglev.mechanics import _kernels, _magnets, integrate, irregularity, packing
+from maglev.mechanics import _kernels, _magnets, packing
 from maglev.mechanics import train as train_model
 from maglev.mechanics._records import Footprints
 from maglev.mechanics.control import grouping
-from maglev.mechanics.course import track_range
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import rail_nodes
 from maglev.parameters import Circuit, Config
+from passages import MEAN, half_size, passed, system_of
 
 CONFIG = Config.model_validate({"train": {"n_cars": 1}, "guideway": {"n_spans": 1}})
 TRAIN = train_model.build(CONFIG.train)
@@ -110,12 +110,6 @@ class Stand:
 @lru_cache
 def packed_spans():
     return system_of(CONFIG).spans
-
-
-@lru_cache
-def system_of(config):
-    track = irregularity.profile(config.irregularity, track_range(config), config.seed)
-    return integrate.prepare(config, track)
 
 
 def all_lanes(gains):
@@ -419,37 +413,20 @@ def see_and_pull(footprints, rows, law, row, side, step, dt, gains, train, rails
 
 
 def small(group="pole", lag="0 ms", delay="0 ms"):
-    """Half a car on half a span."""
+    """Half size, with the same circuits on both kinds of magnet."""
     circuit = {"group": group, "lag": lag, "delay": delay}
-    return Config.model_validate(
-        {
-            "train": {
-                "n_cars": 1,
-                "car_pitch": "12.384 m",
-                "bogie": {"c_frame_spacing": "1.548 m"},
-                "suspension_magnet": {"n_poles": 6, "pole_pitch": "0.258 m"},
-                "guidance_magnet": {"n_poles": 2, "pole_pitch": "0.774 m", "preload": "10 kN"},
-            },
-            "guideway": {"n_spans": 1, "span_length": "12.384 m", "rail": {"units_per_span": 4}},
-            "irregularity": {"fade_in": "5 m"},
-            "passage": {"approach": "5 m", "time_step": "0.25 ms"},
-            "control": {"suspension": circuit, "guidance": circuit},
-        }
+    return half_size(
+        passage={"time_step": "0.25 ms"}, control={"suspension": circuit, "guidance": circuit}
     )
-
-
-def passed(config, gains):
-    return integrate.integrate(system_of(config), np.array(gains, dtype=float), record_every=20)
-
-
-MEAN = np.array(CONFIG.gains.as_row)
 
 
 @pytest.mark.parametrize("late", ["lag", "delay"])
 def test_a_vanishing_lag_or_delay_is_none(late):
-    plain = passed(small(), [MEAN]).gap_history
+    plain = passed(small(), [MEAN], record_every=20).gap_history
     errors = [
-        np.abs(passed(small(**{late: f"{time} ms"}), [MEAN]).gap_history - plain).max()
+        np.abs(
+            passed(small(**{late: f"{time} ms"}), [MEAN], record_every=20).gap_history - plain
+        ).max()
         for time in (0.04, 0.004, 0.0004)
     ]
     assert errors[0] > 1e-9
@@ -462,11 +439,11 @@ def test_a_sample_does_not_know_what_others_feed_back(group, lag, delay):
     """Nor that one of them feeds back the acceleration or an integral."""
     config = small(group, lag, delay)
     own, changes = np.append(MEAN, np.zeros(4)), np.diag([100.0, 1, 1, 1, 0.2, 5e3, 0.2, 5e3])
-    alone = passed(config, [own])
+    alone = passed(config, [own], record_every=20)
     assert not alone.status.any() or group == "half"
     for change in (changes.sum(axis=0), changes[4], changes[5], changes[6]):
         batch = [own + change, own]
-        together = passed(config, batch)
+        together = passed(config, batch, record_every=20)
         for name in ("girder", "body_z", "body_y", "gap_min", "gap_max", "current_max",
                      "status", "gap_history", "current_history", "girder_history"):  # fmt: skip
             mine, theirs = getattr(alone, name)[0], getattr(together, name)[1]

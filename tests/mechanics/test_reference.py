@@ -13,17 +13,17 @@ from maglev.mechanics import course as course_module
 from maglev.mechanics import (
     guideway,
     integrate,
-    irregularity,
     reference,
     reference_magnets,
     reference_step,
 )
 from maglev.mechanics import train as train_model
-from maglev.mechanics.course import course, track_range
+from maglev.mechanics.course import course
 from maglev.mechanics.responses import checked_gains
 from maglev.parameters import Config, Control
+from maglev.simulation import track
+from passages import MEAN
 
-MEAN = np.array(Config().gains.as_row)
 GAINS = MEAN * [[1.0, 1.0, 1.0, 1.0], [1.2, 0.85, 1.1, 0.9], [0.4, 1.0, 1.0, 1.0]]
 """Mean, other, and k_p below i₀/δ₀ = 2500 A/m: the last cannot levitate."""
 
@@ -83,13 +83,9 @@ def heavy(section, factor):
     }
 
 
-def profile_of(config):
-    return irregularity.profile(config.irregularity, track_range(config), config.seed)
-
-
 @lru_cache
 def reference_passages(config, n_samples, every):
-    return reference.integrate(config, profile_of(config), GAINS[:n_samples], record_every=every)
+    return reference.integrate(config, track(config), GAINS[:n_samples], record_every=every)
 
 
 @lru_cache
@@ -100,9 +96,7 @@ def both():
     """
     found, _ = reference_passages(small(13), 3, 1)
     fine = small(39)
-    production = integrate.integrate(
-        integrate.prepare(fine, profile_of(fine)), GAINS, record_every=3
-    )
+    production = integrate.integrate(integrate.prepare(fine, track(fine)), GAINS, record_every=3)
     return found, production
 
 
@@ -207,7 +201,7 @@ def test_both_solvers_agree_on_gains_drawn_at_random(circuit):
     Modes up to 300 Hz, enough for spans of 25 m, leave up to 0.9 % on these of half the length.
     """
     config = controlled(small(39), **CIRCUITS[circuit])
-    gains, profile = drawn(10), profile_of(config)
+    gains, profile = drawn(10), track(config)
     found, effort = reference.solve(config, profile, gains, tolerance=2e-3)
     production = integrate.integrate(integrate.prepare(config, profile), gains)
     assert not found.status.any()
@@ -227,7 +221,7 @@ def test_the_work_of_the_magnets_is_dissipated_or_stored(circuit):
     further = (0.2, 2e3, 0.2, 2e3) if circuit == "all" else (0.0,) * 4
     config = controlled(small(5, cutoff=850.0), **ACCOUNTS[circuit])
     gains = checked_gains([MEAN], further)
-    _, energy = reference.integrate(config, profile_of(config), gains)
+    _, energy = reference.integrate(config, track(config), gains)
     work = (energy.work_on_train + energy.work_on_guideway)[:, 0]
     dissipated, stored = energy.dissipated[:, 0], energy.stored[:, 0]
     assert np.abs(work - dissipated - stored).max() < 1e-2 * np.abs(work).max()
@@ -242,7 +236,7 @@ def plain():
 
 
 def once(config):
-    return reference.integrate(config, profile_of(config), [MEAN])[0]
+    return reference.integrate(config, track(config), [MEAN])[0]
 
 
 @pytest.mark.parametrize("limit", ["lag", "delay"])
@@ -277,7 +271,7 @@ def test_a_train_on_smooth_rigid_track_stays_at_rest(group):
     config = config.model_copy(update={"irregularity": smooth})
     step = course(config).time_step
     before_the_guideway = int(config.passage.approach / config.passage.speed / step)
-    gains, profile = checked_gains([MEAN]), profile_of(config)
+    gains, profile = checked_gains([MEAN]), track(config)
     record = reference.passed(config, profile, gains, step, before_the_guideway)
     assert np.abs(record.body_z).max() < 1e-9
     assert np.abs(record.gap_min - 0.010).max() < 1e-12
@@ -329,7 +323,7 @@ def test_a_delayed_cubic_is_a_cubic(delay):
 def test_the_estimated_error_is_honest():
     """The extremes of two drawn sets against steps six times shorter than the first."""
     config = small(5, cutoff=300.0)
-    gains, profile = drawn(12)[10:], profile_of(config)
+    gains, profile = drawn(12)[10:], track(config)
     found, effort = reference.solve(config, profile, gains, tolerance=5e-3)
     fine = reference.passed(config, profile, gains, effort.step / 3, 3 * effort.n_steps)
     limit = reference.six_extremes(fine)
@@ -345,7 +339,7 @@ def test_an_error_that_stays_too_large_is_refused():
         mock.patch.object(reference, "FIRST_STEP", 1e-3),
     ):
         with pytest.raises(UserError, match=r"^reference: expected errors of at most 1e-06 %"):
-            reference.solve(config, profile_of(config), [MEAN], tolerance=1e-8)
+            reference.solve(config, track(config), [MEAN], tolerance=1e-8)
 
 
 def test_pole_forces_that_do_not_converge_are_refused():
@@ -356,7 +350,7 @@ def test_pole_forces_that_do_not_converge_are_refused():
             UserError, match=r"^reference: the pole forces must converge in 1 iter.* t ="
         ),
     ):
-        reference.integrate(config, profile_of(config), [MEAN])
+        reference.integrate(config, track(config), [MEAN])
 
 
 @lru_cache

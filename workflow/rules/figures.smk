@@ -118,6 +118,14 @@ DRAWN = {
         "what random gains and a random track contribute",
         [file_of("track_split", case=case) for case in TRACK_CASES[:1]],
     ),
+    **{
+        f"fig_in_time{f'_{case}' if k else ''}": (
+            "in_time",
+            f"densities over the time of a passage of '{case}'",
+            [file_of("density_in_time", case=case)],
+        )
+        for k, case in enumerate(followed_cases())
+    },
 }
 
 
@@ -144,5 +152,48 @@ for figure, (module, words, files) in DRAWN.items():
             module=module,
         message:
             f"Draw {words}"
+        shell:
+            "maglev figure {params.module} {input} --out {params.out} 2> {log}"
+
+
+# figure of every case: what it shows, and the stages of whose methods it is drawn
+OF_CASE = {
+    "exceedance": (
+        "exceedances by every method, with the limit states",
+        ("density", "limit_states"),
+    ),
+}
+
+
+def of_every_method(stages):
+    """Function that finds the files of stages for each method of a case."""
+
+    def found(wildcards) -> list[str]:
+        return [file for one in stages for file in of_methods(one, wildcards.case)]
+
+    return found
+
+
+for figure, (words, names) in OF_CASE.items():
+
+    rule:
+        name:
+            f"fig_{figure}"
+        input:
+            of_every_method(names),
+        output:
+            multiext(f"<results>/figures/{{case}}/{figure}", ".png", ".pdf", ".nc"),
+        log:
+            f"<logs>/figures/{{case}}/{figure}.log",
+        benchmark:
+            f"<benchmarks>/figures/{{case}}/{figure}.tsv"
+        conda:
+            "../envs/maglev.yaml"
+        params:
+            out=subpath(output[0], strip_suffix=".png"),
+            code=code_of("figures", f"figures.{figure}"),
+            module=figure,
+        message:
+            f"Draw {words} of {{wildcards.case}}"
         shell:
             "maglev figure {params.module} {input} --out {params.out} 2> {log}"

@@ -1,11 +1,9 @@
 # Which files the cases of the configuration and their methods have, for figures and targets.
 
 
-GAIN_CASES = [
-    case for case in parameters.cases if case.startswith("only_") or case == "all_gains"
-]
-VARIATION_CASES = [case for case in parameters.cases if case.startswith("cov_")]
-TRACK_CASES = [case for case in parameters.cases if parameters.cases[case].random_track]
+GAIN_CASES = named_cases(parameters.figures.by_gain)
+VARIATION_CASES = named_cases(parameters.figures.by_variation)
+TRACK_CASES = [case for case in CASES if parameters.cases[case].track == "random"]
 
 
 def judged(case: str) -> bool:
@@ -45,7 +43,7 @@ def on_tracks(case: str) -> bool:
     """Whether the case exists and its track is drawn, so that there can be others."""
     track = parameters.irregularity
     drawn = track.enabled and track.profile_file is None
-    return case in parameters.cases and case not in TRACK_CASES and drawn
+    return case in CASES and case not in TRACK_CASES and drawn
 
 
 def of_line() -> list[str]:
@@ -55,13 +53,23 @@ def of_line() -> list[str]:
 
 def possible(stage, case: str) -> bool:
     """Whether a case has what a stage of it needs: methods, and a random track for its parts."""
+    if stage.name == "paper_and_ours" and RESPONSE not in parameters.responses_of_study:
+        return False
     of_track = "track_runs" in (stage.name, *stage.inputs)
+    if stage.name == "density_in_time" and case not in parameters.study.in_time.cases:
+        return False
     if "tracks" in (stage.name, *stage.inputs) and not on_tracks(case):
         return False
     needed = [STAGES[role] for role, one in stage.inputs.items() if not one.optional]
     return (case in TRACK_CASES or not of_track) and all(
         methods_of(case, one.methods) for one in (stage, *needed)
     )
+
+
+def followed_cases() -> list[str]:
+    """Cases whose responses are followed over the time of a passage."""
+    stage = STAGES["density_in_time"]
+    return [case for case in parameters.cases if possible(stage, case)]
 
 
 def results() -> list[str]:
@@ -75,15 +83,15 @@ def results() -> list[str]:
         wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
         if name == "control_study" and not CONTROL_CASES:
             continue
+        if name == "limit_state_table" and not parameters.cases:
+            continue
         if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
             files.append(file_of(name))
         if wildcards == {"case"}:
-            cases = [case for case in parameters.cases if possible(stage, case)]
+            cases = [case for case in CASES if possible(stage, case)]
             files += [file_of(name, case=case) for case in cases]
         if wildcards == {"case", "method"}:
-            files += [
-                file for case in parameters.cases for file in of_methods(name, case)
-            ]
+            files += [file for case in CASES for file in of_methods(name, case)]
     return files
 
 
@@ -93,4 +101,8 @@ def figures_of_study() -> list[str]:
         f"<results>/figures/{name}.png"
         for name, (_, _, files) in DRAWN.items()
         if files
+    ] + [
+        f"<results>/figures/{case}/{name}.png"
+        for name in OF_CASE
+        for case in parameters.cases
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from string import ascii_lowercase
 from typing import TypedDict
 
 import matplotlib as mpl
@@ -75,12 +76,14 @@ def panels(rows: int, columns: int, width: float, height: float) -> tuple[Figure
     """A figure of equal panels, lettered (a), (b) … from left to right; sizes in inches."""
     figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.07))
     axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
-    for letter, axis in zip("abcdefghijklmnop", axes, strict=False):
+    for letter, axis in zip(ascii_lowercase, axes, strict=False):
         axis.set_title(f"({letter})", loc="left")
     return figure, axes
 
 
-def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None:
+def note(
+    axis: Axes, text: str, *, top: bool = True, right: bool = True, color: str = "#000000"
+) -> None:
     """Write a note into a corner of a panel."""
     axis.text(
         0.98 if right else 0.02,
@@ -90,6 +93,7 @@ def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None
         ha="right" if right else "left",
         va="top" if top else "bottom",
         fontsize=7,
+        color=color,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
         zorder=5,
     )

@@ -1,4 +1,4 @@
-"""Limits of the six extremes on each of many tracks, and of the line, with their intervals."""
+"""Limits of the extremes on each of many tracks, and of the line, with their intervals."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     """
     n, seed = data.sizes["track"], int(data["seed_of_track"][0])
     levels = data["failure_probability"].to_numpy()
-    fig, panels = labels.response_panels(4.9)
+    fig, panels = labels.response_panels(data, 4.9)
     for response, axis, shown in panels:
         at = data.isel(response=response)
         for column in range(levels.size):

@@ -48,13 +48,13 @@ from maglev.mechanics.lanes import (
 
 @kernel()
 def at_rest(n_dof):
-    """Room for the motion of so many degrees of freedom."""
+    """Motion record of degrees of freedom at rest."""
     return Motion(zeros(n_dof), zeros(n_dof), zeros(n_dof), zeros(n_dof), zeros(n_dof))
 
 
 @kernel()
 def _straight_rails(spans):
-    """Room for the motion of all rails and the forces on them."""
+    """Record of straight, unloaded rails."""
     n = spans.n_spans * spans.stride
     shape = (3, n, LANES)
     return Rails(
@@ -64,7 +64,7 @@ def _straight_rails(spans):
 
 @kernel()
 def _new_watch(n_magnets, n_sections, n_responses):
-    """Room for what is remembered of the motions that are watched."""
+    """Empty memory of the watched responses."""
     return Watch(
         zeros(6),
         zeros(4 * n_sections),
@@ -78,7 +78,7 @@ def _new_watch(n_magnets, n_sections, n_responses):
 
 @kernel()
 def _advance_train(vehicle, dt, train):
-    """Close the last step of the train and open the next.
+    """Finish the train's last velocity step and take its next displacement step.
 
     The velocity that the forces see is predicted from the last two accelerations.
     """
@@ -94,7 +94,7 @@ def _advance_train(vehicle, dt, train):
 
 @kernel()
 def _links(vehicle, train, scaled, pull):
-    """Put the forces of springs and dampers on the train."""
+    """Set the train's forces to those of its springs and dampers."""
     for k in range(vehicle.scaled_dof.size):
         i = entry(vehicle.scaled_dof, k)
         stiffness = own_of(vehicle.scaled_stiffness, vehicle.stiffness_number, k)
@@ -119,7 +119,7 @@ def _links(vehicle, train, scaled, pull):
 
 @kernel()
 def _move_span(spans, span, begin, end, source, packed, motion):
-    """Motion (or its rate) of a span's rails from the relative motion of the coordinates."""
+    """Compute the motion of a span's rails, or its rate, from the relative coordinates."""
     at = span * spans.stride
     up, up_end = spans.upright_start[span], spans.upright_start[span + 1]
     out, out_end = spans.sideways_start[span], spans.sideways_start[span + 1]
@@ -144,7 +144,7 @@ def _move_span(spans, span, begin, end, source, packed, motion):
 
 @kernel()
 def _move_rails(spans, first, last, tail, nose, guideway, packed, rails):
-    """Motion and rate of the rails under the train; no force on them yet."""
+    """Compute motion and rate of the rails under the train, and clear the forces on them."""
     for span in range(first, last + 1):
         begin, end = _covered(spans, span, tail, nose)
         _move_span(spans, span, begin, end, guideway.position, packed, rails.motion)
@@ -157,7 +157,7 @@ def _move_rails(spans, first, last, tail, nose, guideway, packed, rails):
 
 @kernel()
 def _load_span(spans, span, begin, end, rails, turn, packed, force):
-    """Add the forces on a span's rails to the coordinates that move them.
+    """Add the forces on a span's rails to the forces on its coordinates.
 
     Leaves the sum of right and left in ``rails.force[0]`` and the difference in ``turn``.
     """
@@ -188,9 +188,9 @@ def _load_span(spans, span, begin, end, rails, turn, packed, force):
 
 @kernel()
 def _load_guideway(spans, first, last, tail, nose, rails, turn, packed, guideway):
-    """Put the forces on the rails under the train on the guideway.
+    """Transfer the forces on the rails under the train to the guideway's coordinates.
 
-    Returns the motion of midspan, z and y, that modes left out have under them.
+    Returns the midspan displacement, z and y, that these forces cause in the left-out modes.
     """
     rest_z = load(guideway.position, 0) * 0.0
     rest_y = rest_z
@@ -209,7 +209,7 @@ def _load_guideway(spans, first, last, tail, nose, rails, turn, packed, guideway
 
 @kernel()
 def _still(stretches, stretch, rates, guideway):
-    """Leave the coordinates alone that are no longer stepped: modes at rest."""
+    """Bring the coordinates that a new stretch no longer steps to rest."""
     for k in range(stretches.stilled_start[stretch], stretches.stilled_start[stretch + 1]):
         i = stretches.stilled[k]
         store(rates, i, 0.0)
@@ -219,7 +219,7 @@ def _still(stretches, stretch, rates, guideway):
 
 @kernel()
 def _advance_guideway(stretches, stretch, dt, guideway):
-    """As `_advance_train` for what is stepped of the guideway; leaves no accelerations."""
+    """Advance the stepped coordinates of the guideway as `_advance_train`; clear their forces."""
     half = 0.5 * dt
     for n in range(stretches.start[stretch], stretches.start[stretch + 1]):
         i = entry(stretches.stepped, n)
@@ -234,7 +234,7 @@ def _advance_guideway(stretches, stretch, dt, guideway):
 
 @kernel()
 def _answer(spans, stretch, scaled, guideway):
-    """Turn the forces on the coordinates that are stepped into accelerations, in place."""
+    """Turn the forces on the stepped coordinates into accelerations, in place."""
     x, velocity, force = guideway.position, guideway.predicted, guideway.force
     n_modes, stretches = spans.carried_start.size - 1, spans.stretches
     start, tops, stop = (
@@ -302,7 +302,7 @@ def _answer(spans, stretch, scaled, guideway):
 
 @kernel()
 def _covered(spans, span, tail, nose):
-    """Rows of a span's rail coefficients, from and to, of the units that the train is on."""
+    """First and last row of a span's rail coefficients on the units under the train."""
     per_unit = spans.stride // spans.n_units
     unit = spans.span_length / spans.n_units
     start = span * spans.span_length
@@ -322,7 +322,7 @@ def _keep_extreme(outcome, place, value, time):
 
 @kernel()
 def _keep_peak(outcome, watch, place, value, time, dt):
-    """Keep the size of a motion's largest peak, and when it was.
+    """Keep the size and time of a response's largest peak.
 
     A peak is the vertex of the parabola through three values in a row, of which the middle one is
     the largest; the values themselves miss it by up to (ωΔt)²/8 of its size.
@@ -342,7 +342,7 @@ def _keep_peak(outcome, watch, place, value, time, dt):
 
 @kernel()
 def _low_pass(sections, direction, watch, incoming):
-    """Pass a motion of midspan through the low-pass on accelerations."""
+    """Filter an acceleration of midspan by the low-pass."""
     n_sections = sections.shape[0]
     for section in range(n_sections):
         b0, b1, b2, _, a1, a2 = sections[section]
@@ -356,10 +356,10 @@ def _low_pass(sections, direction, watch, incoming):
 
 @kernel()
 def _watch_midspan(spans, timing, step, direction, rest, guideway, watch, outcome):
-    """Displacement of midspan, and its acceleration a step late.
+    """Record the displacement of midspan at this step and its acceleration at the step before.
 
-    What left-out modes add follows the forces at once; its acceleration, a second difference, is
-    that of the step before, and so is what it joins.
+    The left-out modes follow the forces at once.  Their acceleration is a second difference and
+    known one step late, so the acceleration of the kept modes waits for it.
     """
     dt = timing.time_step
     shift = rest * 0.0
@@ -392,7 +392,7 @@ def _watch_midspan(spans, timing, step, direction, rest, guideway, watch, outcom
 
 @kernel()
 def _watch_cars(vehicle, timing, step, train, watch, outcome):
-    """Accelerations of the car bodies."""
+    """Record the accelerations of the car bodies."""
     dt = timing.time_step
     n_cars = vehicle.body_z.size
     record = timing.record_every > 0 and step % timing.record_every == 0
@@ -411,7 +411,7 @@ def _watch_cars(vehicle, timing, step, train, watch, outcome):
 
 @kernel()
 def _record_magnets(timing, step, n_cars, watch, outcome):
-    """Mean gap and current of each magnet."""
+    """Record mean gap and mean current of each magnet."""
     row, at, n = step // timing.record_every - 1, 4 + 2 * n_cars, watch.magnet_gap.shape[0]
     for magnet in range(n):
         store(outcome.history[row], at + magnet, load(watch.magnet_gap, magnet))
@@ -420,7 +420,7 @@ def _record_magnets(timing, step, n_cars, watch, outcome):
 
 @kernel()
 def _note_lost(timing, watch, outcome, time):
-    """Name the samples whose levitation is lost at this step; return how many still hold."""
+    """Set the status of samples that lose levitation at this step; return how many still hold."""
     holding = 0
     for lane in range(LANES):
         if outcome.status[lane] != COMPLETED:
@@ -449,7 +449,7 @@ def _note_lost(timing, watch, outcome, time):
 
 @kernel()
 def _all_lost(timing, watch, outcome, time):
-    """Look for gaps out of bounds at this step; return whether no sample holds any more."""
+    """Check the gaps at this step; return whether all samples have lost levitation."""
     for lane in range(LANES):
         low = min(outcome.gap_min[0, lane], outcome.gap_min[1, lane])
         high = max(outcome.gap_max[0, lane], outcome.gap_max[1, lane])
@@ -492,13 +492,14 @@ def cross(
     lifting_circuits = circuits_at_rest(suspension, suspension_law)
     guiding_circuits = circuits_at_rest(guidance, guidance_law)
     watch = _new_watch(n_magnets, timing.sections.shape[0], outcome.extreme.shape[0])
+    with_magnets = timing.record_every > 0 and outcome.history.shape[1] > 4 + 2 * n_cars
     stretch = -1
     for step in range(timing.first_step, timing.n_steps + 1):
         nose = timing.start + timing.speed * (step * dt)
         tail = nose - timing.train_length
         first = max(0, int(np.floor(tail / spans.span_length)))
         last = min(spans.n_spans - 1, int(np.floor(nose / spans.span_length)))
-        record = timing.record_every > 0 and step % timing.record_every == 0
+        record = with_magnets and step % timing.record_every == 0
         _advance_train(vehicle, dt, train)
         while stretch + 1 < stretches.first_step.size and step >= stretches.first_step[stretch + 1]:
             stretch += 1

@@ -28,14 +28,14 @@ from maglev.mechanics.lanes import (
 
 @kernel()
 def empty_magnet(rows, law):
-    """Room for one magnet."""
+    """Empty record of one magnet."""
     n = rows.offset.size
     return Magnet(zeros(n), zeros(n), zeros(n), zeros(n), zeros(law.n_circuits))
 
 
 @kernel()
 def circuits_at_rest(rows, law):
-    """Circuits whose current holds the train still."""
+    """Circuits at rest, with the currents that carry the train."""
     n = 2 * rows.x.size * law.n_circuits
     current, command = zeros(n), zeros(n)
     none = load(current, 0)
@@ -51,7 +51,7 @@ def circuits_at_rest(rows, law):
 
 @kernel()
 def _look(footprints, rows, law, row, side, step, train, rails, magnet):
-    """Gap error of each pole of a magnet, and its rate where a circuit is fed by it."""
+    """Compute the gap error of each pole of a magnet, and its rate where it feeds a circuit."""
     field = 2 if rows.is_guidance else side
     motion, motion_rate = rails.motion[field], rails.rate[field]
     own_track = footprints.rail.shape[2] > 1
@@ -87,11 +87,11 @@ def _look(footprints, rows, law, row, side, step, train, rails, magnet):
 
 @kernel()
 def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
-    """Currents of a magnet's circuits: the law of control, its delay and its lag.
+    """Compute the currents of a magnet's circuits by the law of control, its delay and its lag.
 
-    ``u = k_p e + k_d de/dt + k_a a + k_i ∫e dt`` of the signal a delay ago is added to the current
-    at rest, kept within the chopper's reach, and followed with the lag (docs/theory/control.md,
-    eqs. 1 to 3).  The acceleration is that of the step before; `_answer_acceleration` mends it.
+    The delayed signal ``u = k_p e + k_d de/dt + k_a a + k_i ∫e dt`` is added to the current at
+    rest, limited to the chopper's range and passed through the lag (docs/theory/control.md,
+    eqs. 1 to 3).  The acceleration is that of the step before; `_answer_acceleration` corrects it.
     """
     kind = 1 if rows.is_guidance else 0
     sign = rows.outward[side]
@@ -161,7 +161,7 @@ def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
 
 @kernel()
 def _attract(rows, law, row, side, gains, magnet):
-    """Pull of each pole; return its sum and moment, the extreme gaps and the strongest current."""
+    """Compute the pull of each pole; return total, moment, extreme gaps and largest current."""
     sign = rows.outward[side]
     n_poles = rows.offset.size
     none = load(magnet.error, 0) * 0.0
@@ -199,9 +199,10 @@ def _attract(rows, law, row, side, gains, magnet):
 
 @kernel()
 def _answer_acceleration(rows, law, row, side, gains, train, magnet, circuits, force_z, force_turn):
-    """Let the pulls answer to the acceleration of this step, not of the last: one Newton step.
+    """Correct the pulls for the acceleration of this step by one Newton step.
 
-    Returns the forces on the magnet's two freedoms beyond those by the acceleration of the last.
+    `_control` knows only the acceleration of the step before.  Returns the additional forces on
+    the magnet's two degrees of freedom.
     """
     n_poles = rows.offset.size
     none = force_z * 0.0
@@ -261,12 +262,12 @@ def _press(footprints, rows, row, side, step, rails, magnet):
 def attract(
     footprints, rows, law, step, dt, gains, train, rails, magnet, circuits, keep, watch, outcome
 ):
-    """Close all magnets of one kind: gaps, currents, forces on train and rails.
+    """Compute gaps, currents and forces of all magnets of one kind, and load train and rails.
 
     Parameters
     ----------
     footprints, rows, law
-        Where the poles are, the magnets, and how their circuits work.
+        Rail under the poles' faces, the magnets, and their law of control.
     step, dt
         Number of the step and its length [s].
     gains : (8, LANES)
@@ -274,7 +275,7 @@ def attract(
     train, rails
         Their motion; receive the forces.
     magnet, circuits
-        Room for one magnet, and the state of all circuits of the kind.
+        Working record of one magnet, and the state of all circuits of the kind.
     keep
         Whether mean gaps and currents of each magnet are to be recorded.
     watch, outcome

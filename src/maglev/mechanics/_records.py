@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 COMPLETED, CONTACT, GAP_LOST, NOT_FINITE, STEP_TOO_LARGE = 0, 1, 2, 3, 4
-"""How a passage ended: the values of ``status`` [-]."""
+"""End of a passage: the values of ``status`` [-]."""
 
 
 class Terms(NamedTuple):
@@ -28,8 +28,8 @@ class Terms(NamedTuple):
 class Vehicle(NamedTuple):
     """Train with open magnets; links in rows and columns of non-zero coefficients.
 
-    Springs and dampers of a kind pull by ``stiffness * x + damping * velocity`` of what they hang
-    on; each degree of freedom is scaled so once for every kind of link that it meets.
+    A link pulls by ``stiffness * x + damping * velocity`` of its degrees of freedom; this sum is
+    formed once for each degree of freedom and kind of link.
     """
 
     inverse_mass: np.ndarray  # (dof,) own by mass_number
@@ -39,7 +39,7 @@ class Vehicle(NamedTuple):
     stiffness_number: np.ndarray
     scaled_damping: np.ndarray  # (scaled,) own by damping_number
     damping_number: np.ndarray
-    link_start: np.ndarray  # (link + 1,) what pulls in a link
+    link_start: np.ndarray  # (link + 1,) first scaled degree of freedom of each link
     link_scaled: np.ndarray  # (non-zero,)
     link_coefficient: np.ndarray  # (non-zero,)
     pull_start: np.ndarray  # (dof + 1,) the links that pull at a degree of freedom
@@ -52,10 +52,10 @@ class Vehicle(NamedTuple):
 
 
 class MagnetRows(NamedTuple):
-    """Magnets of one kind, right and left at the same place."""
+    """Magnets of one kind in rows, the right and the left one at the same x."""
 
     x: np.ndarray  # (row,) centre relative to the nose [m]
-    number: np.ndarray  # (row, side) place in the train's table of magnets
+    number: np.ndarray  # (row, side) row in the train's table of magnets
     translation: np.ndarray  # (row, side) degree of freedom
     rotation: np.ndarray  # (row, side)
     static_force: np.ndarray  # (row side,) [N] own by force_number
@@ -77,7 +77,7 @@ class MagnetRows(NamedTuple):
 
 
 class Law(NamedTuple):
-    """How the circuits of one kind of magnet make currents of gaps."""
+    """Law of control of one kind of magnet: from gaps to currents."""
 
     n_circuits: int  # of one magnet
     own_gap: bool  # every pole has a circuit that its own gap feeds
@@ -103,7 +103,7 @@ class Law(NamedTuple):
 
 
 class Circuits(NamedTuple):
-    """State of the circuits of one kind, those of a magnet next to each other."""
+    """State of the circuits of one kind; those of a magnet are adjacent."""
 
     current: np.ndarray  # (circuit, LANES) [A]
     command: np.ndarray  # (circuit, LANES) at the step before [A]
@@ -113,7 +113,7 @@ class Circuits(NamedTuple):
 
 
 class Magnet(NamedTuple):
-    """One magnet at one step: what its poles and circuits see and do."""
+    """One magnet at one step: gap errors and pulls of its poles, currents of its circuits."""
 
     error: np.ndarray  # (pole, LANES) gap error, in the direction of the displacement [m]
     rate: np.ndarray  # (pole, LANES) [m/s]
@@ -133,7 +133,7 @@ class Motion(NamedTuple):
 
 
 class Rails(NamedTuple):
-    """Coefficients of the rails' motion: right z, left z, y; those of a span next to each other."""
+    """Coefficients of the rails' motion (right z, left z, y); those of a span are adjacent."""
 
     motion: np.ndarray  # (field, coefficient, LANES)
     rate: np.ndarray  # (field, coefficient, LANES)
@@ -141,7 +141,7 @@ class Rails(NamedTuple):
 
 
 class Watch(NamedTuple):
-    """What is remembered of the motions that are watched."""
+    """Memory of the watched responses: filter states, last values, gaps and currents."""
 
     left_out: np.ndarray  # (6, LANES) midspan by left-out modes, its change, acceleration; z, y
     filtered: np.ndarray  # (4 section, LANES) state of the low-pass
@@ -153,7 +153,7 @@ class Watch(NamedTuple):
 
 
 class Stretches(NamedTuple):
-    """What is stepped of the guideway when: stretches of a passage, and the rows they step with.
+    """Stretches of a passage: the coordinates stepped in each, and the rows of their matrices.
 
     Before the first stretch the guideway rests.
     """
@@ -177,8 +177,8 @@ class Stretches(NamedTuple):
 class Spans(NamedTuple):
     """Guideway in component coordinates: modes of spans, modes of piers, pier tops.
 
-    A mode counts from where the pier tops would take it if it were rigid.  While the train is where
-    it is, only the coordinates of a stretch are stepped; the other modes follow the pier tops.
+    The coordinate of a mode is its motion relative to the pier tops.  In each stretch of a passage
+    only some coordinates are stepped; the other modes follow the pier tops.
 
     Where samples have guideways of their own, the rails' shapes are those of a basis that all
     share, the same for each span, and a sample's coordinates change to it: ``change`` holds the
@@ -227,16 +227,16 @@ class Spans(NamedTuple):
 class Footprints(NamedTuple):
     """Rail under a pole's face, wherever the face can be after a whole number of steps."""
 
-    number: np.ndarray  # (row, pole) place at time zero; each step moves on by one
-    first: np.ndarray  # (place,) first of the rail coefficients under the face
-    start: np.ndarray  # (place + 1,) of their weights; none off the guideway
+    number: np.ndarray  # (row, pole) footprint at time zero; each step moves on by one
+    first: np.ndarray  # (footprint,) first of the rail coefficients under the face
+    start: np.ndarray  # (footprint + 1,) of their weights; none off the guideway
     weight: np.ndarray  # of the coefficients in the rail's mean motion under the face
     rise: np.ndarray  # of the coefficients in the mean rate over a step as the pole moves on [1/s]
-    rail: np.ndarray  # (place, side, 1 or LANES) irregularity of all samples, or of each [m]
-    ramp: np.ndarray  # (place, side, 1 or LANES) its rate at the pole [m/s]
+    rail: np.ndarray  # (footprint, side, 1 or LANES) irregularity of all samples, or of each [m]
+    ramp: np.ndarray  # (footprint, side, 1 or LANES) its rate at the pole [m/s]
     level: float | np.ndarray  # factor on both [-]; own, one row: then the sag is not in them
-    sag: np.ndarray  # (place side,) standing sag [m], where levels are own
-    sag_rise: np.ndarray  # (place side,) its rate at the pole [m/s]
+    sag: np.ndarray  # (footprint side,) standing sag [m], where levels are own
+    sag_rise: np.ndarray  # (footprint side,) its rate at the pole [m/s]
     sagging: float | np.ndarray  # factor on the sag [-] own, one row
 
 
@@ -247,7 +247,7 @@ class Timing(NamedTuple):
     n_steps: int
     time_step: float
     speed: float
-    start: float  # place of the nose at time zero [m]
+    start: float  # position of the nose at time zero [m]
     train_length: float
     gap_contact: np.ndarray  # (LANES,) [m]
     gap_lost: np.ndarray  # (LANES,) [m]
@@ -256,7 +256,7 @@ class Timing(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What one row of samples leaves behind."""
+    """Results of one row of samples."""
 
     extreme: np.ndarray  # (4 + 2 car, LANES) girder z, y, acceleration z, y; bodies' z; bodies' y
     extreme_time: np.ndarray  # same

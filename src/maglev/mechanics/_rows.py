@@ -44,7 +44,7 @@ def add_terms(terms, sign, source, target):
 
 @kernel()
 def gather(source, columns, start, stop, packed, first):
-    """``packed[first + m] = source[columns[start + m]]``: products then read rows in a row."""
+    """``packed[first + m] = source[columns[start + m]]``, so that products read adjacent rows."""
     for m in range(start, stop):
         store(packed, first + m - start, load(source, entry(columns, m)))
 
@@ -53,7 +53,7 @@ def gather(source, columns, start, stop, packed, first):
 def transform(matrix, start, stop, packed, at, left, right, target, first):
     """``target[first + k] = Σ_m matrix[start + m, k] packed[at + m]`` for ``left`` ≤ k < ``right``.
 
-    As many rows at once as there are registers; the order of a sum does not depend on it.
+    As many rows are computed at once as there are registers; the order of each sum is the same.
     """
     none = load(packed, at) * 0.0
     width = matrix.shape[1]
@@ -90,9 +90,9 @@ def transform(matrix, start, stop, packed, at, left, right, target, first):
 def transform_both(
     mean, up, up_end, turn, out, out_end, packed, left, right, right_rail, left_rail, first
 ):
-    """Motion of both rails from that of their mean and the roll, each as by `transform`.
+    """Motion of both rails from that of their mean and the roll, each computed as by `transform`.
 
-    ``packed`` holds what moves the mean, then what rolls it.
+    ``packed`` holds the coordinates of the mean, then those of the roll.
     """
     n = up_end - up
     none = load(packed, 0) * 0.0

@@ -69,12 +69,12 @@ class BeamLine:
 
 @dataclass(frozen=True)
 class GuidewayModel:
-    """Matrices of the guideway, and rows that give its motion at any place along it.
+    """Matrices of the guideway, and rows of its motion at any position along it.
 
     Attributes
     ----------
     parameters
-        What it was built from.
+        Parameters of the guideway.
     mass, stiffness : csr (dof, dof)
         Of beams, connectors and bearings, after elimination of rigid arms and pier feet
         [kg, kg m, kg m^2] and [N/m, N, N m].  Symmetric and positive definite.
@@ -87,9 +87,9 @@ class GuidewayModel:
     pier_dof : tuple of (dof of a pier,)
         Degrees of freedom of each pier below its top.
     component : (dof,)
-        Which motion a degree of freedom is: 0 … 5 for x, y, z, φ, θ, ψ.
+        Direction of each degree of freedom: 0 … 5 for x, y, z, φ, θ, ψ.
     place : (dof, 3)
-        Where its node lies [m]: x from the first pier, y, and z below the girder axis.
+        Position of its node [m]: x from the first pier, y, and z below the girder axis.
     rail_lines
         The right and the left rail.
     girder_line
@@ -116,12 +116,12 @@ class GuidewayModel:
     def rail_rows(
         self, x: npt.ArrayLike, side: int
     ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, sparse.csr_array]:
-        """Rows that give the motion of a rail's axis; their transposes apply loads to it.
+        """Rows of the motion of a rail's axis; their transposes apply loads to it.
 
         Parameters
         ----------
         x : (point,)
-            Places along the guideway [m], 0 at the first pier.  At the joint of two units the one
+            Places along the guideway [m], 0 at the first pier.  At the joint of two units the unit
             ahead counts; outside the guideway the rows are zero.
         side
             `RIGHT` or `LEFT`.
@@ -143,7 +143,7 @@ class GuidewayModel:
     def rail_section_rows(
         self, x: npt.ArrayLike, side: int
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Rows that give the rotation of a rail's section, shear left out.
+        """Rows of the rotation of a rail's section, without shear.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class GuidewayModel:
         Returns
         -------
         turn_z, turn_y : csr (point, dof)
-            Slope of the section in the vertical and in the lateral plane, positive where it lifts
+            Slope of the section in the vertical and in the lateral plane, of the sign of
             the slope of the axis [rad].
         """
         line = self.rail_lines[0 if side == RIGHT else 1]
@@ -163,7 +163,7 @@ class GuidewayModel:
         )
 
     def girder_rows(self, x: npt.ArrayLike) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Rows that give the motion of the girder's axis.
+        """Rows of the motion of the girder's axis.
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class ModalDamping:
     Attributes
     ----------
     rate
-        a, which every mode above the cut-off keeps [1/s].
+        a, the rate of every mode above the cut-off [1/s].
     mass : csr (dof, dof)
         M.
     frequency : (mode,)
@@ -247,12 +247,18 @@ def build(guideway: Guideway) -> GuidewayModel:
     Parameters
     ----------
     guideway
-        All that is given.
+        Parameters of the guideway.
 
     Returns
     -------
     model
         Degrees of freedom in the order pier, span, pier, …; each span's sorted along x.
+
+    Examples
+    --------
+    >>> model = build(Guideway(n_spans=1))
+    >>> model.pier_top_dof.shape  # two piers
+    (2, 6)
     """
     span, pier_mass, pier_stiffness, pier_depth = one_span(guideway), *one_pier(guideway)
     n_pier, n_span, n_spans = pier_mass.shape[0], span.mass.shape[0], guideway.n_spans
@@ -329,6 +335,12 @@ def modes(model: GuidewayModel, cutoff_hz: float) -> tuple[FloatArray, FloatArra
     References
     ----------
     Parlett, The Symmetric Eigenvalue Problem (1998), ch. 3 and 13.
+
+    Examples
+    --------
+    >>> frequency, shape = modes(build(Guideway(n_spans=1)), 20.0)
+    >>> bool(frequency.size > 0 and frequency[-1] <= 20.0)
+    True
     """
     if not cutoff_hz > 0:
         raise UserError(f"cutoff_hz must be positive, got {cutoff_hz} Hz")
@@ -386,6 +398,12 @@ def damping(model: GuidewayModel, ratio: float, cutoff_hz: float) -> ModalDampin
     References
     ----------
     Wilson and Penzien, Int. J. Numer. Methods Eng. 4 (1972) 5-10.
+
+    Examples
+    --------
+    >>> found = damping(build(Guideway(n_spans=1)), 0.02, 20.0)
+    >>> bool((found.coefficient <= 0.0).all())
+    True
     """
     if not 0 <= ratio < 1:
         raise UserError(f"damping ratio must lie in [0, 1), got {ratio}")
@@ -558,6 +576,11 @@ def rectangle_torsion_constant(width: float, depth: float) -> float:
     References
     ----------
     Timoshenko and Goodier, Theory of Elasticity (1970), sec. 109.
+
+    Examples
+    --------
+    >>> round(rectangle_torsion_constant(1.0, 1.0), 4)
+    0.1406
     """
     if not (width > 0 and depth > 0):
         raise UserError(f"sides must be positive, got {width} m and {depth} m")

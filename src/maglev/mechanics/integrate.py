@@ -90,7 +90,7 @@ def prepare(config: Config, profile: Profile) -> System:
     config
         Parameters of everything.
     profile
-        Track irregularity over `track_range`; nothing before the fade-in, where the train rests.
+        Track irregularity over `track_range`, zero before the fade-in, where the train rests.
 
     Returns
     -------
@@ -148,14 +148,14 @@ def integrate(
     values: Mapping[str, FloatArray] | None = None,
     profile_of: Callable[[int], Profile] | None = None,
     record_every: int = 0,
+    with_magnets: bool = True,
     n_threads: int = 1,
     on_progress: Callable[[int], None] | None = None,
 ) -> Passages:
     """Run one passage per row of gains.
 
-    A sample whose gains make a motion grow by the step alone is not judged: its status says so.
-
-    A sample's numbers do not depend on its neighbours, on their number or on ``n_threads``.
+    A sample for whose gains the step is unstable is not judged: its status says so.  A sample's
+    numbers do not depend on its neighbours, on their number or on ``n_threads``.
 
     Parameters
     ----------
@@ -172,6 +172,8 @@ def integrate(
         not given.
     record_every
         Steps between recorded rows of the histories; zero records none.
+    with_magnets
+        Whether histories have the gaps and currents of the magnets, most of their size.
     n_threads
         Rows of samples that run at the same time.
     on_progress
@@ -189,7 +191,7 @@ def integrate(
         rest.
     """
     gains = checked_gains(gains, system.config.gains.further)
-    batch = _batch(system, gains, values or {}, profile_of, record_every)
+    batch = _batch(system, gains, values or {}, profile_of, record_every, with_magnets)
     found: list[tuple[Outcome, BoolArray]] = []
     n_rows = -(-gains.shape[0] // LANES)
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
@@ -228,6 +230,7 @@ class _Batch:
     grounds: tuple[packing.Ground, packing.Ground]
     shape: Shape | None
     frame: Frame | None
+    with_magnets: bool
 
     def samples(self, rows: range) -> IntArray:
         """Numbers of the samples in rows; the last stands wherever a row is not full."""
@@ -241,6 +244,7 @@ def _batch(
     values: Mapping[str, FloatArray],
     profile_of: Callable[[int], Profile] | None,
     record_every: int,
+    with_magnets: bool,
 ) -> _Batch:
     """What all samples share."""
     config, kinds = system.config, (system.suspension, system.guidance)
@@ -275,6 +279,7 @@ def _batch(
         grounds,
         shape,
         frame,
+        with_magnets,
     )
 
 
@@ -339,7 +344,7 @@ def _shared_arguments(batch: _Batch, row: int) -> tuple:
         system.spans,
         batch.timing,
         np.ascontiguousarray(batch.gains[batch.samples(range(row, row + 1))].T),
-        packing.empty_outcome(system.train, kinds, batch.timing),
+        packing.empty_outcome(system.train, kinds, batch.timing, with_magnets=batch.with_magnets),
     )
 
 
@@ -372,7 +377,7 @@ def _own_arguments(
         spans,
         timing,
         np.ascontiguousarray(batch.gains[batch.samples(range(row, row + 1))].T),
-        packing.empty_outcome(system.train, kinds, timing),
+        packing.empty_outcome(system.train, kinds, timing, with_magnets=batch.with_magnets),
     )
 
 
@@ -390,7 +395,7 @@ def _tracks_of_row(batch: _Batch, row: int) -> tuple[Footprints, Footprints]:
 
 
 def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ...]) -> None:
-    """Refuse a step at which the guideway, or the train at its mean gains, would grow by itself."""
+    """Refuse a step that is unstable for the guideway or for the train at its mean gains."""
     dt, gains = course(config).time_step, _mean_gains(config)
     limit = guideway_limit(config, reduced, dt)
     if not step_holds(parts, gains, dt):

@@ -34,7 +34,7 @@ LANES = 16
 """Samples side by side [-]: two AVX-512 or four AVX2 registers of doubles."""
 
 WIDE = bool(binding.get_host_cpu_features().get("avx512f", False))
-"""Whether the processor has 32 registers for rows, not 16: kernels then take more rows at once."""
+"""Whether the processor has 32 vector registers, not 16: kernels then take more rows at once."""
 
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 

@@ -38,15 +38,15 @@ _SHARED = np.zeros(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class Ground:
-    """Where poles of one kind can be after whole numbers of steps, and the sag of the rails there.
+    """Positions of the faces of one kind of pole after whole numbers of steps, and the sag there.
 
     Attributes
     ----------
-    x : (place,)
+    x : (footprint,)
         Middle of a pole's face [m].
     pole_length
         Of the face [m].
-    sag, sag_slope : (place, side)
+    sag, sag_slope : (footprint, side)
         Standing sag in the direction of the irregularity [m], and its derivative along travel [-].
     """
 
@@ -140,19 +140,19 @@ def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: FloatArray)
     Parameters
     ----------
     circuit
-        Who shares a circuit, and how late its current comes.
+        Sharing of circuits, and lag and delay of their current.
     rows
         The magnets.
     time_step
         Δt [s].
     gains : (sample, 8)
-        Of all samples: they say whether acceleration and integral part are needed at all.
+        Gains of all samples; terms whose gains are all zero are skipped.
 
     Returns
     -------
     law
-        A command that is linear within a step is followed exactly by the lag; the delayed signal is
-        that of a parabola through three steps.
+        The lag is exact for a command that is linear within a step; the delayed signal is
+        interpolated by a parabola through three steps.
 
     References
     ----------
@@ -205,7 +205,9 @@ def footprints(
     way = course(config)
     begins = (rows.x[:, None] + rows.offset + way.start) / way.advance
     whole = np.floor(begins + 1e-6)
-    beyond = np.round(begins - whole, 6)  # share of a step; places with the same one form a series
+    beyond = np.round(
+        begins - whole, 6
+    )  # share of a step; footprints with the same share form a series
     series = np.unique(beyond)
     earliest = int(whole.min())
     count = int(whole.max()) - earliest + way.n_steps + 1
@@ -217,15 +219,15 @@ def footprints(
     )
     sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x, way.advance)
     apart = np.array([1.0, -1.0 if rows.is_guidance else 1.0])
-    nothing = np.zeros((x.size, 2, 1))
+    flat = np.zeros((x.size, 2, 1))
     tabulated = Footprints(
         number=number,
         first=faces.first,
         start=faces.start,
         weight=faces.weight,
         rise=faces.slope * config.passage.speed,
-        rail=nothing,
-        ramp=nothing,
+        rail=flat,
+        ramp=flat,
         level=1.0,
         sag=np.zeros(2 * x.size),
         sag_rise=np.zeros(2 * x.size),
@@ -247,7 +249,7 @@ def _magnet(config: Config, rows: MagnetRows) -> Magnet:
 def tracks(
     config: Config, grounds: tuple[Ground, Ground], profiles: Sequence[Profile]
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Irregularity at the places of each kind of pole, and its rate (place, side, profile)."""
+    """Irregularity under each kind of pole, and its rate (footprint, side, profile)."""
     met = []
     one_each = list({id(profile): profile for profile in profiles}.values())
     column = [next(k for k, one in enumerate(one_each) if one is profile) for profile in profiles]
@@ -275,7 +277,7 @@ def _standing_sag(
     x: FloatArray,
     advance: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Sag of the rails under poles at ``x`` beyond that of the modes, and its slope along x.
+    """Sag of the rails at poles at ``x`` that the modes leave out, and its slope along x.
 
     The slope under a face is its mean over a step, as that of `face_weights`.
     """
@@ -390,7 +392,7 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
 
 
 def _relative(reduced: ReducedGuideway, span: int, shape: FloatArray) -> FloatArray:
-    """Motion (column, …) in a span when its modes count from where the pier tops take them."""
+    """Shapes (column, …) of a span whose modes are relative to the pier tops."""
     columns, own = reduced.span_coordinates[span], reduced.own_modes(span)
     tops = columns[own.size :] - reduced.n_modes
     carried = reduced.carried[own][:, tops]
@@ -398,10 +400,10 @@ def _relative(reduced: ReducedGuideway, span: int, shape: FloatArray) -> FloatAr
 
 
 def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array:
-    """Damping on the rates of the coordinates as stepped.
+    """Damping matrix for the rates of a step.
 
-    A mode's rate in a step, a central difference, is sinc(ωΔt) of its true one; its own damping
-    makes up for that.
+    The rate of a mode in a step, a central difference, is sinc(ωΔt) times the true one; its own
+    damping is divided by this factor.
     """
     damping = reduced.relative_damping.copy()
     phase = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes]) * time_step
@@ -412,9 +414,9 @@ def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array
 
 
 def whole_and_short(matrix: sp.csr_array, always: BoolArray) -> sp.csr_array:
-    """The rows of a matrix, then the same without columns that are not stepped in all stretches.
+    """The rows of a matrix, then the same rows without columns that some stretch does not step.
 
-    Short rows are those of quiet spans.
+    The short rows are those of quiet spans.
     """
     both = sp.vstack([matrix, matrix @ sp.diags_array(always.astype(float))]).tocsr()
     both.eliminate_zeros()
@@ -428,9 +430,9 @@ def _stretches(
     damping_start: IntArray,
     taken_start: IntArray,
 ) -> Stretches:
-    """Active coordinates of each stretch.
+    """Active coordinates of each stretch, and the ends of their rows in the matrices.
 
-    With the ends of their rows, whole or short, of damping and of modes carried by pier tops.
+    Rows, whole or short, of the damping and of the modes carried by pier tops.
     """
     n = reduced.n_modes
     dt = course(config).time_step
@@ -500,9 +502,16 @@ def timing(config: Config, record_every: int) -> Timing:
 
 
 def empty_outcome(
-    train: train_model.TrainModel, kinds: tuple[MagnetRows, MagnetRows], timing: Timing
+    train: train_model.TrainModel,
+    kinds: tuple[MagnetRows, MagnetRows],
+    timing: Timing,
+    *,
+    with_magnets: bool = True,
 ) -> Outcome:
-    """Empty results of a row of samples, as for a train at rest."""
+    """Results of a row of samples before the first step: those of a train at rest.
+
+    Without the magnets, histories have no room for their gaps and currents.
+    """
     n_cars = train.parameters.n_cars
     table = train.magnets
     n_magnets = table.x.size
@@ -514,10 +523,11 @@ def empty_outcome(
             [kind.current_reference for kind in kinds],
         )
     )
-    history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets, LANES))
-    of_kind = table.is_guidance.astype(np.int64)
-    history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]
-    history[:, -n_magnets:] = current[of_kind]
+    history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets * with_magnets, LANES))
+    if with_magnets:
+        of_kind = table.is_guidance.astype(np.int64)
+        history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]
+        history[:, -n_magnets:] = current[of_kind]
     return Outcome(
         extreme=np.zeros((4 + 2 * n_cars, LANES)),
         extreme_time=np.zeros((4 + 2 * n_cars, LANES)),

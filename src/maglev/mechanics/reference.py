@@ -1,8 +1,8 @@
-"""The reference solver: every degree of freedom, Newmark's rule, and an error that is known.
+"""The reference solver: every degree of freedom, Newmark's rule, and a known error.
 
-Written to be read and believed, not to be fast.  It shares with the production solver the physical
-models of train, guideway and track, and no line of the time integration, the magnets or the
-coupling.  What magnets see and do stands in `maglev.mechanics.reference_magnets`, one step in
+It is written to be read and believed, not to be fast.  It shares with the production solver the
+physical models of train, guideway and track, and no code of the time integration, the magnets or
+the coupling.  Magnets stand in `maglev.mechanics.reference_magnets`, one step in
 `maglev.mechanics.reference_step`, whole passages here.  Theory: docs/theory/integration.md,
 "Reference solver".
 """
@@ -39,8 +39,8 @@ from maglev.mechanics.responses import (
 from maglev.parameters import Config
 
 FIRST_STEP = 0.36e-3
-"""Longest first step [s]: 100 Hz, the upper end of the band, turn by 0.23 in it, which lengthens
-their period by 0.4 %; half of it leaves 0.1 %, the tolerance, before extrapolation."""
+"""Longest first step [s].  At 100 Hz, the upper end of the band, ωΔt = 0.23 lengthens the period by
+0.4 %; half the step leaves 0.1 %, the tolerance, before extrapolation."""
 
 FEWEST_IN_A_PERIOD = 6
 """Fewest first steps in the period of pole passing [-].
@@ -49,18 +49,18 @@ With four, harmonics of the load fold into the band, and the error falls with no
 step: extrapolated from 0.54 and 0.27 ms at 430 km/h, an acceleration was 0.1 % off."""
 
 MOST_HALVINGS = 5
-"""Halvings of the first step after which a passage is given up [-]."""
+"""Largest number of halvings of the first step [-]."""
 
 ERROR = 1e-3
 """Largest estimated error of an extreme, as a share of it [-]."""
 
 CAUTION = 0.5
-"""Estimated error of an extrapolated extreme, as a share of what extrapolation has changed [-].
+"""Estimated error of an extrapolated extreme, as a share of the change by extrapolation [-].
 
-Where that was above 0.1 %, a fifth of it or less was left."""
+Where the change was above 0.1 %, a fifth of it or less was left."""
 
 NEGLIGIBLE = 1e-3
-"""Share of the vertical extreme below which a lateral one is not resolved for its own sake [-]."""
+"""The error of a lateral extreme is relative to at least this share of the vertical one [-]."""
 
 RESPONSES = (*GIRDER_RESPONSES, "car_body_acceleration_z", "car_body_acceleration_y")
 """The six responses whose error is estimated."""
@@ -76,9 +76,9 @@ class Energy:
     ----------
     time : (step,)
     work_on_train, work_on_guideway : (step, sample)
-        Work of the magnets' forces beyond those at rest on the train, and of all on the rails.
+        Work of the magnets: on the train by forces beyond those at rest, on the rails by all.
     dissipated : (step, sample)
-        In links, bearings and the guideway's damping.
+        Energy dissipated in links, bearings and the guideway's damping.
     stored : (step, sample)
         Kinetic and strain energy of train and guideway.
     """
@@ -100,7 +100,7 @@ class Fate:
 
     @classmethod
     def open(cls, n_samples: int) -> Fate:
-        """All running."""
+        """Fate of samples that are all under way."""
         return cls(
             np.zeros(n_samples, dtype=np.int64),
             np.full(n_samples, np.nan),
@@ -110,7 +110,7 @@ class Fate:
 
 @dataclass
 class Record:
-    """Histories of one run and the end of each passage.
+    """Histories of passages that are computed together, and the end of each.
 
     Attributes
     ----------
@@ -125,11 +125,11 @@ class Record:
     gap, current : (record, magnet, sample)
         Means of magnets, every so many steps [m, A].
     power : (step, 3, sample)
-        On the train, on the guideway, and what is dissipated [W].
+        On the train, on the guideway, and dissipated [W].
     stored : (step, sample)
         Energy [J].
     fate
-        How it ended.
+        End of each passage.
     """
 
     time: FloatArray
@@ -147,7 +147,7 @@ class Record:
 
 
 def _blank(of: System, n_steps: int, n_records: int) -> Record:
-    """A record of a train at rest."""
+    """Record of a train at rest."""
     train, n_samples = of.config.train, of.n_samples
     kinds = (train.suspension_magnet, train.guidance_magnet)
     first = np.flatnonzero(np.diff(of.poles.magnet, prepend=-1))
@@ -247,7 +247,7 @@ def _stored(of: System, state: State) -> FloatArray:
 
 
 def _judge(fate: Fate, of: System, state: State, time: float) -> None:
-    """Mark the samples that lose levitation; they stay at rest from then on."""
+    """Set the end of samples that lose levitation; they rest from then on."""
     gap, passage = state.magnets.gap, of.config.passage
     lost = (fate.status == 0) & ~held(of, state.magnets)
     for sample in np.flatnonzero(lost):
@@ -334,7 +334,7 @@ def passed(
 
 
 def energy_of(record: Record) -> Energy:
-    """The energy account of a run."""
+    """Energy account of a record."""
     step = record.time[0]
     before = np.concatenate([np.zeros_like(record.power[:1]), record.power[:-1]])
     work = np.cumsum(0.5 * step * (before + record.power), axis=0)
@@ -356,7 +356,7 @@ def integrate(
     Parameters
     ----------
     config
-        Parameters of everything; the step is `maglev.mechanics.course.time_step`.
+        Parameters of everything; the step is that of `maglev.mechanics.course`.
     profile
         Track irregularity.
     gains : (sample, 4) or (sample, 8)
@@ -371,7 +371,7 @@ def integrate(
     passages
         Extremes, outcomes and histories.
     energy
-        Where the energy went.
+        Account of the energy.
 
     Raises
     ------
@@ -417,7 +417,7 @@ class Effort:
 
     @property
     def attributes(self) -> dict[str, float | int]:
-        """For a dataset: the step, how many, the largest estimated error, the seconds."""
+        """Attributes of a dataset: step, number of steps, largest estimated error, seconds."""
         return {
             "time_step": self.step,
             "n_steps": self.n_steps,
@@ -438,11 +438,11 @@ def solve(
 ) -> tuple[Passages, Effort]:
     """Run one passage per row of gains; halve the step until the extremes converge.
 
-    Newmark's rule is of second order, and so are the histories of a run: of two runs, with Δt and
-    Δt/2, a third of the difference is the error of the finer one and is taken off it.  Half of that
-    third is the estimate of what is left, until there are three runs: then what the third run has
-    changed is, or an eighth of the third if that is more.  Poles that are points always take three
-    runs: they strike the rails at joints, and the error falls with no fixed power of the step.
+    Newmark's rule is of second order.  Of two solutions, with steps Δt and Δt/2, a third of the
+    difference is the error of the finer one and is subtracted.  The error left is estimated as half
+    of that third; with a third solution, as the change that it brings, or an eighth of the third if
+    that is more.  Poles that are points always take three solutions: they strike the rails at
+    joints, and the error falls with no fixed power of the step.
 
     Parameters
     ----------
@@ -464,7 +464,7 @@ def solve(
     passages
         Extremes, outcomes and histories.
     effort
-        The step it took, the estimated errors, the seconds.
+        Last step, estimated errors and computing time.
 
     Raises
     ------
@@ -503,7 +503,7 @@ def solve(
 
 
 def extrapolated(coarse: Record, fine: Record) -> Record:
-    """Richardson extrapolation of the responses from two runs, one with twice the step."""
+    """Richardson extrapolation of the responses from two records, one with twice the step."""
 
     def better(name: str) -> FloatArray:
         one, other = getattr(coarse, name), getattr(fine, name)
@@ -534,7 +534,7 @@ def _estimated_error(better: FloatArray, fine: FloatArray, before: FloatArray | 
     better, fine
         With and without extrapolation.
     before
-        Extrapolated from steps twice as long, if there were any.
+        Extrapolated from steps twice as long, where there is such a solution.
     """
     error = CAUTION * np.abs(better - fine)
     if before is not None:
@@ -561,7 +561,7 @@ def _worst(error: FloatArray) -> FloatArray:
 
 
 def passages_of(record: Record, every: int) -> Passages:
-    """Extremes, outcomes and thinned histories of a run."""
+    """Extremes, outcomes and thinned histories of a record."""
     status = record.fate.status
     girder, girder_time = extremes(record.girder, record.time, status)
     body_z, body_z_time = extremes(record.body_z, record.time, status)
@@ -596,12 +596,12 @@ def passages_of(record: Record, every: int) -> Passages:
 def extremes(
     history: FloatArray, time: FloatArray, status: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Largest absolute values: vertices of parabolas through three steps.
+    """Largest absolute values, as vertices of parabolas through three steps.
 
     Parameters
     ----------
     history : (step, ..., sample)
-        What is watched.
+        Histories of responses.
     time : (step,)
         Of the steps [s].
     status : (sample,)

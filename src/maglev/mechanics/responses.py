@@ -35,12 +35,12 @@ class Passages:
     gap_min, gap_max, current_max : (sample, kind)
         Of suspension and guidance [m, m, A].
     status : (sample,)
-        How the passage ended: 0 completed, 1 contact, 2 gap lost, 3 not finite, 4 not judged, as
+        End of the passage: 0 completed, 1 contact, 2 gap lost, 3 not finite, 4 not judged, as
         the step is too large for the gains.
     lost_time : (sample,)
         When levitation was lost [s]; NaN where it was not.
     lost_magnet : (sample,)
-        Where, in the train's table of magnets; -1 where it was not.
+        Magnet that lost it, a row of the train's table; -1 where none did.
     time : (record,)
         Elapsed time of the recorded steps [s].
     girder_history : (sample, response, record)
@@ -136,12 +136,17 @@ def checked_gains(gains: npt.ArrayLike, further: tuple[float, ...] = (0.0,) * 4)
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d; then suspension k_a [A s²/m],
         k_i [A/(m s)], guidance k_a, k_i.
     further : (4,)
-        The last four where only four are given, from `maglev.parameters.Gains.further`.
+        Values of the last four where only four are given, from `maglev.parameters.Gains.further`.
 
     Raises
     ------
     UserError
         If they have another shape, no sample, or a value that is not finite.
+
+    Examples
+    --------
+    >>> checked_gains([[3500.0, 17.5, 4500.0, 17.5]]).shape
+    (1, 8)
     """
     array = np.asarray(gains, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] not in (4, 8):
@@ -192,6 +197,11 @@ def acceleration_filter(passage: Passage, time_step: float) -> FloatArray:
     References
     ----------
     docs/theory/integration.md, eq. 8.
+
+    Examples
+    --------
+    >>> acceleration_filter(Passage(), 0.5e-3).shape  # eighth order
+    (4, 6)
     """
     band = passage.acceleration_band
     if band is None:

@@ -25,15 +25,15 @@ FAILURE_PROBABILITIES = (1e-1, 1e-2, 1e-3)
 """Levels at which limits are given by default."""
 
 CARRIED = 10
-"""Expected exceedances, to the nearest whole number, that a sample needs to carry a level; fewer
-and no number is given."""
+"""Expected exceedances, to the nearest whole number, that a sample needs at a level; with fewer, no
+limit is given."""
 
 _ROUNDING = 1e-12  # of a sum of probabilities, so that 1000 samples carry exactly one at 1e-3
 
 
 CLUSTERS_BEYOND = 3.0
-"""Expected clusters, such as tracks, at a level that they need to carry it; assumed: 32 tracks then
-carry 0.1.  The coverage is counted in a test."""
+"""Expected number of clusters, such as tracks, that a limit needs beyond it; assumed: 32 tracks
+then carry the level 0.1.  The coverage is counted in a test."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ class Limits:
         Limits [unit of the value]; NaN where ``status`` is not ``"given"``.
     lower, upper : (level,) or None
         Ends of the interval [unit]; infinite where the sample does not bound that side, NaN
-        where ``limit`` is, None where no interval can be had.
+        where ``limit`` is NaN, None where there is no interval.
     expected_exceedances : (level,)
         Number of held samples expected beyond the limit [-].
     status : (level,)
-        A word of `maglev.vocabulary.LIMIT_STATUS`: too few are less than ten expected exceedances.
+        A word of `maglev.vocabulary.LIMIT_STATUS`; fewer than ten expected exceedances are too few.
     confidence
         Confidence of the interval [-]; None with no interval.
     """
@@ -233,8 +233,8 @@ def surrogate_limits(
     failure_probability : (level,)
         Failure probabilities [-].
     residuals : (training,), optional
-        Leave-one-out residuals, computed value less prediction [unit]; those of the training
-        points near the tail alone, where errors differ across the domain.
+        Leave-one-out residuals, computed value less prediction [unit]; where errors differ
+        across the domain, only those of training points near the tail.
     standard_deviation : (sample,), optional
         Posterior deviation of each prediction [unit].
     error_range : optional
@@ -346,10 +346,10 @@ def clustered_limits(
 ) -> Limits:
     """Limits of samples that come in equally likely clusters, such as the gains on some tracks.
 
-    The limit is that of all samples together.  How far it is known is decided by the number of
-    clusters: the exceedance at the limit is a mean over clusters with its own effective size, which
-    gives the exact binomial interval of the exceedance, and the limits at its ends are those of the
-    limit.
+    The limit is that of all samples together.  Its interval depends on the number of clusters: the
+    exceedance at the limit is a mean over clusters with an effective size of its own.  From it
+    follows the exact binomial interval of the exceedance; the limits at the ends of that interval
+    are the ends of the interval of the limit.
 
     Parameters
     ----------
@@ -363,8 +363,8 @@ def clustered_limits(
     Returns
     -------
     limits
-        One limit per level; ``expected_exceedances`` counts clusters.  Too few are less than
-        `CLUSTERS_BEYOND` of them.
+        One limit per level; ``expected_exceedances`` counts clusters, of which at least
+        `CLUSTERS_BEYOND` are needed.
 
     Raises
     ------
@@ -398,7 +398,7 @@ def clustered_limits(
     carried = n * levels >= CLUSTERS_BEYOND
 
     def at(level: float) -> float:
-        """The smallest value that at most a share of all samples exceeds."""
+        """Smallest value that at most a given share of all samples exceeds."""
         allowed = int(ranked.size * level * (1.0 + _ROUNDING))
         return float(ranked[max(ranked.size - allowed - 1, 0)])
 
@@ -437,9 +437,9 @@ def error_range_near(
 ) -> tuple[FloatArray, FloatArray]:
     """Range of a surrogate's error where its response is near given values.
 
-    As many training samples as the confidence takes, those whose values are nearest, give their
-    smallest and largest leave-one-out residual.  With fewer samples than that in all, residuals
-    are taken as normal: Student's interval of one more of them.
+    The range is that of the leave-one-out residuals of the training samples with the nearest
+    values, the fewest that the confidence needs.  With fewer samples in all, the range is Student's
+    prediction interval of a further residual, residuals taken as normal.
 
     Parameters
     ----------
