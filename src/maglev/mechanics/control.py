@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.parameters import Circuit
+from maglev.parameters import Circuit, Control
 
 
 @dataclass(frozen=True)
@@ -207,6 +207,12 @@ def _halving(n: int) -> IntArray:
         found[int(share * n)] = None
         number += 1
     return np.array(list(found), dtype=np.int64)
+
+
+def first_moving_step(control: Control, first_step: int) -> int:
+    """Number of the first step on which anything moves: with failed magnets, the first of all."""
+    fails = control.suspension.failed_magnets or control.guidance.failed_magnets
+    return 1 if fails else first_step
 
 
 def refuse_too_many(n_failed: npt.ArrayLike, n_magnets: int, *, guidance: bool) -> None:

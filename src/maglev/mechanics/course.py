@@ -92,15 +92,13 @@ def course(config: Config) -> Course:
     start = _start(config, speed * dt)
     way = config.guideway.length + config.train.length - start
     fade_in = config.irregularity.fade_in if config.irregularity.enabled else 0.0
-    circuits = (config.control.suspension, config.control.guidance)
-    fails = any(circuit.failed_magnets for circuit in circuits)
     resting = (-start - fade_in) / speed / dt * (1 - 1e-9)
     return Course(
         time_step=dt,
         speed=speed,
         start=start,
         n_steps=math.ceil(way / speed / dt),
-        first_step=1 if fails else max(1, math.floor(resting)),
+        first_step=max(1, math.floor(resting)),
     )
 
 

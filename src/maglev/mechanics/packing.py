@@ -23,7 +23,7 @@ from maglev.mechanics._records import (
     Vehicle,
 )
 from maglev.mechanics.activity import Stretch, stepped_mass, stretches, top_stiffness
-from maglev.mechanics.control import grouping, late_current, without_current
+from maglev.mechanics.control import first_moving_step, grouping, late_current, without_current
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile, mean_displacement
 from maglev.mechanics.lanes import LANES
@@ -488,7 +488,7 @@ def timing(config: Config, record_every: int) -> Timing:
     passage = config.passage
     way = course(config)
     return Timing(
-        first_step=way.first_step,
+        first_step=first_moving_step(config.control, way.first_step),
         n_steps=way.n_steps,
         time_step=way.time_step,
         speed=passage.speed,
