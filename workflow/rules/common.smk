@@ -29,6 +29,11 @@ def methods_of(case: str, among: tuple[str, ...] = METHODS) -> list[str]:
     return [one for one in among if one in named]
 
 
+def swept_cases(case: str) -> list[str]:
+    """Cases that the sweep of a case makes, in its order."""
+    return [f"{case}_{number}" for number in parameters.cases[case].settings()]
+
+
 def checked_cases(every: bool) -> list[str]:
     """Cases whose statistics can be checked: with a baseline of their own, or all."""
     return [
@@ -96,11 +101,20 @@ def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str,
                 else methods_of(one, (BASELINE,))
             )
         ]
-    if stage.name == "limit_state_table":
+    if stage.name in ("limits_table", "limit_state_table"):
         return [
             {"case": one, "method": method}
-            for one in parameters.cases
+            for one in CASES
             for method in methods_of(one)
+        ]
+    if stage.name == "sweep":
+        return [
+            (
+                {"case": one, "method": methods_of(one)[-1]}
+                if "method" in by
+                else {"case": one}
+            )
+            for one in swept_cases(case)
         ]
     return {
         ("method",): lambda: [
