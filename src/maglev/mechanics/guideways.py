@@ -124,8 +124,9 @@ class Piece:
         What a mode takes along of the tops' motion [-].
     stiffness, mass : (top, top)
         Of the tops when the component follows them, modes at rest; and of all of it.
-    static : (coordinate,)
-        Static shape under a unit force at midspan of a span [m/N].
+    static : (coordinate, load)
+        Static shapes of a span under a unit force at midspan and at the bearings of either end
+        [m/N].
     """
 
     square: FloatArray
@@ -137,7 +138,7 @@ class Piece:
     static: FloatArray
 
 
-def piece(matrices: Matrices, n_tops: int, like: FloatArray, load: FloatArray) -> Piece:
+def piece(matrices: Matrices, n_tops: int, like: FloatArray, loads: FloatArray) -> Piece:
     """Modes and constraint modes of one family of a component.
 
     Parameters
@@ -148,8 +149,8 @@ def piece(matrices: Matrices, n_tops: int, like: FloatArray, load: FloatArray) -
         Coordinates of pier tops among them, the last.
     like : (coordinate, mode)
         Modes of the mean, times its mass: a sample's are put in their order, with their signs.
-    load : (coordinate,)
-        Forces per unit of a force, of which the static shape is wanted.
+    loads : (coordinate, load)
+        Forces per unit of those whose static shapes are wanted.
     """
     n = matrices.mass.shape[0] - n_tops
     inner, coupling = matrices.stiffness[:n, :n], matrices.stiffness[:n, n:]
@@ -161,8 +162,8 @@ def piece(matrices: Matrices, n_tops: int, like: FloatArray, load: FloatArray) -
     row, column = linear_sum_assignment(-np.abs(overlap))
     sign = np.where(overlap[row, column] < 0, -1.0, 1.0)
     square, shape = square[column], shape[:, column] * sign
-    solved = np.asarray(np.linalg.solve(inner, np.column_stack([-coupling, load])), dtype=float)
-    constraint = solved[:, :-1]
+    solved = np.asarray(np.linalg.solve(inner, np.hstack([-coupling, loads])), dtype=float)
+    constraint = solved[:, :n_tops]
     inertia = mass @ constraint + shared
     return Piece(
         square=square,
@@ -171,7 +172,7 @@ def piece(matrices: Matrices, n_tops: int, like: FloatArray, load: FloatArray) -
         share=shape.T @ inertia,
         stiffness=matrices.stiffness[n:, n:] + coupling.T @ constraint,
         mass=matrices.mass[n:, n:] + constraint.T @ inertia + shared.T @ constraint,
-        static=solved[:, -1],
+        static=solved[:, n_tops:],
     )
 
 
@@ -210,6 +211,13 @@ class Basis:
     midspan: tuple[FloatArray, FloatArray]
     shapes: tuple[FloatArray, FloatArray]
 
+    @property
+    def opening(self) -> tuple[FloatArray, FloatArray]:
+        """Opening of the bearings at either end (end, coordinate): mean of the even family, half
+        the difference of the odd one."""
+        even, odd = self.ends
+        return -0.5 * (even[:, 2] + even[:, 5]), -0.5 * (odd[:, 2] - odd[:, 5])
+
     def span_pieces(self, guideway: Guideway) -> tuple[Piece, Piece]:
         """Modes of a span of a guideway, even and odd."""
         families = [Matrices(np.zeros_like(one), np.zeros_like(one)) for one in self.lumped]
@@ -217,8 +225,12 @@ class Basis:
             elements.add_to(families, guideway)
         strength = _strength(guideway)
         found = []
+        loads = [self.midspan[k][:, None] for k in (0, 1)]
+        loads = [
+            np.hstack([load, self.opening[k][:, : load.shape[0]].T]) for k, load in enumerate(loads)
+        ]
         for matrices, lumped, ends, like, load in zip(
-            families, self.lumped, self.ends, self.span_like, self.midspan, strict=True
+            families, self.lumped, self.ends, self.span_like, loads, strict=True
         ):
             matrices.mass += guideway.rail.connector_mass * lumped
             for end, of_end in zip(ends, strength, strict=True):
@@ -235,7 +247,7 @@ class Basis:
         for elements in self.pier:
             elements.add_to(families, guideway)
         even, odd = (
-            piece(matrices, 3, like, np.zeros(like.shape[0]))
+            piece(matrices, 3, like, np.zeros((like.shape[0], 0)))
             for matrices, like in zip(families, self.pier_like, strict=True)
         )
         return even, odd

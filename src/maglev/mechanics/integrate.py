@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -27,6 +28,7 @@ from maglev.mechanics._records import (
     Timing,
     Vehicle,
 )
+from maglev.mechanics.comfort import WEIGHTINGS, readings
 from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
@@ -42,7 +44,8 @@ from maglev.mechanics.own import (
 )
 from maglev.mechanics.own_spans import Frame, frame_of, guideways_of, own_spans
 from maglev.mechanics.reduction import ReducedGuideway, reduce
-from maglev.mechanics.responses import Passages, checked_gains
+from maglev.mechanics.responses import Passages, checked_gains, compared_with
+from maglev.mechanics.statics import influence, largest_deflection
 from maglev.mechanics.step_limit import (
     Headroom,
     guideway_limit,
@@ -60,7 +63,10 @@ from maglev.parameters import Config
 
 @dataclass(frozen=True)
 class System:
-    """Train, guideway, magnets and track as arrays for the kernels."""
+    """Train, guideway, magnets and track as arrays for the kernels.
+
+    ``static_deflection`` is the largest of midspan under the train at rest [m].
+    """
 
     train: train_model.TrainModel
     reduced: ReducedGuideway
@@ -75,6 +81,7 @@ class System:
     safe_gains: FloatArray
     headroom: Headroom
     profile: Profile
+    static_deflection: float
     config: Config
 
 
@@ -136,6 +143,7 @@ def prepare(config: Config, profile: Profile) -> System:
         safe_gains=safe_gains(parts, _mean_gains(config), course(config).time_step),
         headroom=headroom(parts, _mean_gains(config), own_rates(train), course(config).time_step),
         profile=profile,
+        static_deflection=largest_deflection(guideway, train),
         config=config,
     )
 
@@ -192,24 +200,30 @@ def integrate(
     """
     gains = checked_gains(gains, system.config.gains.further)
     batch = _batch(system, gains, values or {}, profile_of, record_every, with_magnets)
-    found: list[tuple[Outcome, BoolArray]] = []
+    found: list[tuple[Outcome, BoolArray, dict[str, FloatArray]]] = []
     n_rows = -(-gains.shape[0] // LANES)
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
         for first in range(0, n_rows, BLOCK):
             rows = range(first, min(first + BLOCK, n_rows))
             of_row = _block(batch, rows)
 
-            def one_row(row: int, of_row: RowOf = of_row) -> tuple[Outcome, BoolArray]:
-                arguments, too_fast = of_row(row)
+            def one_row(
+                row: int, of_row: RowOf = of_row
+            ) -> tuple[Outcome, BoolArray, dict[str, FloatArray]]:
+                arguments, too_fast, compared = of_row(row)
                 cross(*arguments)
                 if on_progress is not None:
                     on_progress(min(LANES, gains.shape[0] - row * LANES))
-                return arguments[-1], too_fast
+                return arguments[-1], too_fast, compared
 
             found += pool.map(one_row, rows)
-    outcomes = [outcome for outcome, _ in found]
-    too_fast = np.concatenate([flags for _, flags in found])[: gains.shape[0]]
-    return _gathered(outcomes, gains.shape[0], system, batch.timing, too_fast)
+    outcomes = [outcome for outcome, _, _ in found]
+    too_fast = np.concatenate([flags for _, flags, _ in found])[: gains.shape[0]]
+    compared = {
+        name: np.concatenate([row[name] for _, _, row in found])[: gains.shape[0]]
+        for name in found[0][2]
+    }
+    return _gathered(outcomes, gains.shape[0], system, batch.timing, too_fast, compared)
 
 
 BLOCK = 16
@@ -236,6 +250,12 @@ class _Batch:
         """Numbers of the samples in rows; the last stands wherever a row is not full."""
         numbers = np.arange(rows.start * LANES, rows.stop * LANES)
         return np.minimum(numbers, self.gains.shape[0] - 1)
+
+
+@lru_cache(maxsize=2)
+def influence_of(config: Config) -> FloatArray:
+    """Deflection of midspan per force of each pole at rest, for all places of the train."""
+    return influence(guideway_model.build(config.guideway), train_model.build(config.train))
 
 
 def _batch(
@@ -294,9 +314,9 @@ def _on_tracks(
     return first, second
 
 
-RowOf = Callable[[int], tuple[tuple, BoolArray]]
-"""Arguments of the kernel for a row by its number, and which of its samples the step is too large
-for (LANES,)."""
+RowOf = Callable[[int], tuple[tuple, BoolArray, dict[str, FloatArray]]]
+"""Of a row by its number: arguments of the kernel, for which of its samples the step is too large
+(LANES,), and what its responses are compared with."""
 
 
 def _block(batch: _Batch, rows: range) -> RowOf:
@@ -310,24 +330,28 @@ def _block(batch: _Batch, rows: range) -> RowOf:
 
     if batch.shape is None:
         too_fast = samples_too_fast(system.parts, gains, timing.time_step, system.safe_gains)
-        return lambda row: (_shared_arguments(batch, row), too_fast[lanes(row)])
+        compared = compared_with(system.config, system.static_deflection, LANES)
+        return lambda row: (_shared_arguments(batch, row), too_fast[lanes(row)], compared)
     values = {key: of_all[numbers] for key, of_all in batch.values.items()}
     others = {key: values[key] for key in batch.shape.keys}
     own = own_trains(batch.shape, others, numbers.size)
+    influence = influence_of(system.config)
     too_fast = trains_too_fast(system.config, system.headroom, own.rates, gains, others)
 
-    def of_row(row: int) -> tuple[tuple, BoolArray]:
+    def of_row(row: int) -> tuple[tuple, BoolArray, dict[str, FloatArray]]:
         samples = lanes(row)
         spans, beyond = system.spans, np.zeros(LANES, dtype=bool)
-        stiffer = np.ones(LANES)
+        stiffer, softness = np.ones(LANES), np.ones(LANES)
         if batch.frame is not None:
             each = {key: one[samples] for key, one in values.items()}
             guideways = guideways_of(system.config, each, range(LANES))
-            spans, beyond = own_spans(batch.frame, guideways)
+            spans, beyond, softness = own_spans(batch.frame, guideways)
             modulus = [one.rail.section.elastic_modulus for one in guideways]
             stiffer = np.array(modulus) / system.config.guideway.rail.section.elastic_modulus
         arguments = _own_arguments(batch, own, row, samples, spans, 1.0 / stiffer)
-        return arguments, too_fast[samples] | beyond
+        compared = own.compared_with(influence, system.config.guideway.span_length, samples)
+        compared["static_deflection"] *= softness
+        return arguments, too_fast[samples] | beyond, compared
 
     return of_row
 
@@ -428,6 +452,7 @@ def _gathered(
     system: System,
     timing: Timing,
     too_fast: BoolArray,
+    compared: dict[str, FloatArray],
 ) -> Passages:
     n_cars = system.vehicle.body_z.size
     n_magnets = system.train.magnets.x.size
@@ -454,13 +479,30 @@ def _gathered(
     bounds = np.where(is_lost[:, None], samples_first("at_loss"), bounds)
     bounds[too_fast], history[too_fast] = np.nan, np.nan
     at = 4 + 2 * n_cars
+    ends = extreme[:, at : at + 2 * n_cars]
+    ends_time = when[:, at : at + 2 * n_cars]
+    signed = samples_first("signed")
+    squares = samples_first("squares").reshape(n_samples, len(WEIGHTINGS), n_cars, 2)
+    weighted = np.sqrt(squares.max(axis=3) / readings(system.config).count)
+    for of_sample in (signed, weighted):
+        of_sample[status != COMPLETED] = np.nan
     return Passages(
         girder=extreme[:, :4],
         girder_time=when[:, :4],
         body_z=extreme[:, 4 : 4 + n_cars],
-        body_y=extreme[:, 4 + n_cars :],
+        body_y=extreme[:, 4 + n_cars : at],
         body_z_time=when[:, 4 : 4 + n_cars],
-        body_y_time=when[:, 4 + n_cars :],
+        body_y_time=when[:, 4 + n_cars : at],
+        girder_positive=signed[:, 0::2],
+        girder_negative=signed[:, 1::2],
+        end_z=ends[:, :n_cars],
+        end_y=ends[:, n_cars:],
+        end_z_time=ends_time[:, :n_cars],
+        end_y_time=ends_time[:, n_cars:],
+        weighted=weighted,
+        lift=extreme[:, -1],
+        lift_time=when[:, -1],
+        **compared,
         gap_min=bounds[:, 0:2],
         gap_max=bounds[:, 2:4],
         current_max=bounds[:, 4:6],

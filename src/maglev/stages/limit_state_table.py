@@ -98,7 +98,7 @@ def limit_words(state: xr.Dataset) -> str:
     if response == "none":
         return str(state["definition"].item())
     value, unit = _shown(state)
-    return f"{RESPONSE_WORDS[response]} > {value:.6g} {unit}".rstrip()  # type: ignore[index]
+    return f"{RESPONSE_WORDS[response]} > {value:.6g} {unit}".rstrip()
 
 
 def _shown(state: xr.Dataset) -> tuple[float, str]:
@@ -106,7 +106,7 @@ def _shown(state: xr.Dataset) -> tuple[float, str]:
     response = str(state["state_response"].item())
     if response == "none":
         return np.nan, ""
-    scale, unit = SHOWN[RESPONSE_UNITS[response]]  # type: ignore[index]
+    scale, unit = SHOWN[RESPONSE_UNITS[response]]
     return scale * float(state["threshold"]), unit
 
 
