@@ -250,14 +250,18 @@ def compared(keys, values, n_samples):
     ],
 )
 def test_guideways_in_one_basis_are_those_built_anew(keys):
-    """One number after the other at 2.5 deviations to either side."""
+    """One number after the other at 2.5 deviations to either side.
+
+    With a quarter of the damping the bearings' share of it, scaled with the rest, is seen.
+    """
     keys = [f"guideway.{key}" for key in keys]
     rows = [(key, side) for key in keys for side in (-2.5, 2.5)]
     values = {key: np.full(len(rows), FINE.number_at(key)[0]) for key in keys}
     for row, (key, side) in enumerate(rows):
         values[key][row] *= 1 + side * deviation(key)
     for row, difference in compared(keys, values, len(rows)):
-        assert difference < 5e-3, rows[row]
+        key, _ = rows[row]
+        assert difference < (1e-2 if key == "guideway.damping_ratio" else 5e-3), rows[row]
 
 
 @pytest.mark.slow

@@ -192,14 +192,20 @@ def _load_span(spans, span, begin, end, rails, turn, packed, force):
 def _left_out_at_bearings(spans, begin, end, force, turn, across, at, watch):
     """Opening of the middle span's bearings by its left-out modes."""
     none = load(watch.bearing, 0) * 0.0
-    stride = spans.stride
     for side in range(2):
         mean, half = none, none
-        z, roll, y = 3 * side * stride, (3 * side + 1) * stride, (3 * side + 2) * stride
         for k in range(begin, end):
-            mean = fma(load(force, at + k), own(spans.bearing_rest, z + k), mean)
-            half = fma(load(turn, k), own(spans.bearing_rest, roll + k), half)
-            half = fma(load(across, at + k), own(spans.bearing_rest, y + k), half)
+            mean = fma(
+                load(force, at + k), own(spans.bearing_rest, 3 * side * spans.stride + k), mean
+            )
+            half = fma(
+                load(turn, k), own(spans.bearing_rest, (3 * side + 1) * spans.stride + k), half
+            )
+            half = fma(
+                load(across, at + k),
+                own(spans.bearing_rest, (3 * side + 2) * spans.stride + k),
+                half,
+            )
         store(watch.bearing, 2 * side, mean)
         store(watch.bearing, 2 * side + 1, half)
 
@@ -466,8 +472,8 @@ def _watch_cars(vehicle, timing, step, train, watch, outcome):
         _keep_peak(outcome, watch, 4 + car, up, step * dt, dt)
         _keep_peak(outcome, watch, 4 + n_cars + car, across, step * dt, dt)
         pitch, yaw = vehicle.body_pitch[car], vehicle.body_yaw[car]
-        turn = load(train.force, pitch) * own_of(mass, number, pitch) * vehicle.end_distance
-        swing = load(train.force, yaw) * own_of(mass, number, yaw) * vehicle.end_distance
+        turn = load(train.force, pitch) * (own_of(mass, number, pitch) * vehicle.end_distance)
+        swing = load(train.force, yaw) * (own_of(mass, number, yaw) * vehicle.end_distance)
         end_z = maximum(up, -1.0 * up) + maximum(turn, -1.0 * turn)
         end_y = maximum(across, -1.0 * across) + maximum(swing, -1.0 * swing)
         _keep_peak(outcome, watch, 4 + 2 * n_cars + car, end_z, step * dt, dt)

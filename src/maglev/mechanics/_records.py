@@ -242,10 +242,12 @@ class Spans(NamedTuple):
     midspan: np.ndarray  # (2 output column,) z and y, own (2 output column, LANES)
     middle: int  # span that midspan is of
     rest: np.ndarray  # (3 stride,) midspan z by z, y by roll and y of its left-out modes [m/N] own
-    bearing: np.ndarray  # (4 output column,) opening at the first end, mean and half difference of
-    # right and left, then at the last; own
-    bearing_rest: np.ndarray  # (6 stride,) at each end mean by z, half difference by roll and y own
     in_order: np.ndarray  # 0, 1, 2, … as many as there are rows of any table here
+    bearing: np.ndarray  # (4 output column,) opening at the first end, mean and half difference of
+    # right and left, then at the last; own (4 output column, LANES)
+    bearing_rest: (
+        np.ndarray
+    )  # (6 stride,) at each end mean by z, half difference by roll and y; own
 
 
 class Footprints(NamedTuple):

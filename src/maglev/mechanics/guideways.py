@@ -125,7 +125,8 @@ class Piece:
     stiffness, mass : (top, top)
         Of the tops when the component follows them, modes at rest; and of all of it.
     static : (coordinate, load)
-        Static shapes under unit forces at midspan of a span and at its two ends' bearings [m/N].
+        Static shapes of a span under a unit force at midspan and at the bearings of either end
+        [m/N].
     """
 
     square: FloatArray
@@ -137,7 +138,7 @@ class Piece:
     static: FloatArray
 
 
-def piece(matrices: Matrices, n_tops: int, like: FloatArray, load: FloatArray) -> Piece:
+def piece(matrices: Matrices, n_tops: int, like: FloatArray, loads: FloatArray) -> Piece:
     """Modes and constraint modes of one family of a component.
 
     Parameters
@@ -148,8 +149,8 @@ def piece(matrices: Matrices, n_tops: int, like: FloatArray, load: FloatArray) -
         Coordinates of pier tops among them, the last.
     like : (coordinate, mode)
         Modes of the mean, times its mass: a sample's are put in their order, with their signs.
-    load : (coordinate, load)
-        Forces per unit of each load whose static shape is wanted.
+    loads : (coordinate, load)
+        Forces per unit of those whose static shapes are wanted.
     """
     n = matrices.mass.shape[0] - n_tops
     inner, coupling = matrices.stiffness[:n, :n], matrices.stiffness[:n, n:]
@@ -161,7 +162,7 @@ def piece(matrices: Matrices, n_tops: int, like: FloatArray, load: FloatArray) -
     row, column = linear_sum_assignment(-np.abs(overlap))
     sign = np.where(overlap[row, column] < 0, -1.0, 1.0)
     square, shape = square[column], shape[:, column] * sign
-    solved = np.asarray(np.linalg.solve(inner, np.column_stack([-coupling, load])), dtype=float)
+    solved = np.asarray(np.linalg.solve(inner, np.hstack([-coupling, loads])), dtype=float)
     constraint = solved[:, :n_tops]
     inertia = mass @ constraint + shared
     return Piece(
@@ -210,6 +211,13 @@ class Basis:
     midspan: tuple[FloatArray, FloatArray]
     shapes: tuple[FloatArray, FloatArray]
 
+    @property
+    def opening(self) -> tuple[FloatArray, FloatArray]:
+        """Opening of the bearings at either end (end, coordinate): mean of the even family, half
+        the difference of the odd one."""
+        even, odd = self.ends
+        return -0.5 * (even[:, 2] + even[:, 5]), -0.5 * (odd[:, 2] - odd[:, 5])
+
     def span_pieces(self, guideway: Guideway) -> tuple[Piece, Piece]:
         """Modes of a span of a guideway, even and odd."""
         families = [Matrices(np.zeros_like(one), np.zeros_like(one)) for one in self.lumped]
@@ -217,15 +225,17 @@ class Basis:
             elements.add_to(families, guideway)
         strength = _strength(guideway)
         found = []
+        loads = [self.midspan[k][:, None] for k in (0, 1)]
+        loads = [
+            np.hstack([load, self.opening[k][:, : load.shape[0]].T]) for k, load in enumerate(loads)
+        ]
         for matrices, lumped, ends, like, load in zip(
-            families, self.lumped, self.ends, self.span_like, self.midspan, strict=True
+            families, self.lumped, self.ends, self.span_like, loads, strict=True
         ):
             matrices.mass += guideway.rail.connector_mass * lumped
             for end, of_end in zip(ends, strength, strict=True):
                 matrices.stiffness += end.T @ (of_end[:, None] * end)
-            n = load.size
-            loads = np.column_stack([load, *(lift_of(end)[:n] for end in ends)])
-            found.append(piece(matrices, 6, like, loads))
+            found.append(piece(matrices, 6, like, load))
         return found[0], found[1]
 
     def pier_pieces(self, guideway: Guideway) -> tuple[Piece, Piece]:
@@ -241,14 +251,6 @@ class Basis:
             for matrices, like in zip(families, self.pier_like, strict=True)
         )
         return even, odd
-
-
-def lift_of(end: FloatArray) -> FloatArray:
-    """Lift (coordinate,) off the right bearing of an end, of the rows of `Basis.ends`.
-
-    Of the even family it is the mean of both bearings, of the odd one half their difference.
-    """
-    return -end[2]
 
 
 def _strength(guideway: Guideway) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -44,7 +45,7 @@ from maglev.mechanics.own import (
 from maglev.mechanics.own_spans import Frame, frame_of, guideways_of, own_spans
 from maglev.mechanics.reduction import ReducedGuideway, reduce
 from maglev.mechanics.responses import Passages, checked_gains, compared_with
-from maglev.mechanics.statics import largest_deflection
+from maglev.mechanics.statics import influence, largest_deflection
 from maglev.mechanics.step_limit import (
     Headroom,
     guideway_limit,
@@ -78,9 +79,9 @@ class System:
     spans: Spans
     parts: tuple[Block, ...]
     safe_gains: FloatArray
-    static_deflection: float
     headroom: Headroom
     profile: Profile
+    static_deflection: float
     config: Config
 
 
@@ -140,9 +141,9 @@ def prepare(config: Config, profile: Profile) -> System:
         spans=packing.spans(reduced, config),
         parts=parts,
         safe_gains=safe_gains(parts, _mean_gains(config), course(config).time_step),
-        static_deflection=largest_deflection(guideway, train),
         headroom=headroom(parts, _mean_gains(config), own_rates(train), course(config).time_step),
         profile=profile,
+        static_deflection=largest_deflection(guideway, train),
         config=config,
     )
 
@@ -199,40 +200,30 @@ def integrate(
     """
     gains = checked_gains(gains, system.config.gains.further)
     batch = _batch(system, gains, values or {}, profile_of, record_every, with_magnets)
-    found: list[tuple[Outcome, BoolArray, FloatArray]] = []
+    found: list[tuple[Outcome, BoolArray, dict[str, FloatArray]]] = []
     n_rows = -(-gains.shape[0] // LANES)
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
         for first in range(0, n_rows, BLOCK):
             rows = range(first, min(first + BLOCK, n_rows))
             of_row = _block(batch, rows)
 
-            def one_row(row: int, of_row: RowOf = of_row) -> tuple[Outcome, BoolArray, FloatArray]:
-                arguments, too_fast, softer = of_row(row)
+            def one_row(
+                row: int, of_row: RowOf = of_row
+            ) -> tuple[Outcome, BoolArray, dict[str, FloatArray]]:
+                arguments, too_fast, compared = of_row(row)
                 cross(*arguments)
                 if on_progress is not None:
                     on_progress(min(LANES, gains.shape[0] - row * LANES))
-                return arguments[-1], too_fast, softer
+                return arguments[-1], too_fast, compared
 
             found += pool.map(one_row, rows)
-    n = gains.shape[0]
     outcomes = [outcome for outcome, _, _ in found]
-    too_fast = np.concatenate([flags for _, flags, _ in found])[:n]
-    deflection = system.static_deflection * np.concatenate([softer for _, _, softer in found])[:n]
-    compared = _compared(system.config, values or {}, deflection)
-    return _gathered(outcomes, n, system, batch.timing, too_fast, compared)
-
-
-def _compared(
-    config: Config, values: Mapping[str, FloatArray], deflection: FloatArray
-) -> dict[str, FloatArray]:
-    """What responses are compared with, each sample's own where it differs."""
-    compared = compared_with(config, 1.0, deflection.size) | {"static_deflection": deflection}
-    for number, kind in enumerate(("suspension", "guidance")):
-        for name, key in (("gap_reference", "gap_reference"), ("current_limit", "current_max")):
-            own = values.get(f"train.{kind}_magnet.{key}")
-            if own is not None:
-                compared[name][:, number] = own
-    return compared
+    too_fast = np.concatenate([flags for _, flags, _ in found])[: gains.shape[0]]
+    compared = {
+        name: np.concatenate([row[name] for _, _, row in found])[: gains.shape[0]]
+        for name in found[0][2]
+    }
+    return _gathered(outcomes, gains.shape[0], system, batch.timing, too_fast, compared)
 
 
 BLOCK = 16
@@ -259,6 +250,12 @@ class _Batch:
         """Numbers of the samples in rows; the last stands wherever a row is not full."""
         numbers = np.arange(rows.start * LANES, rows.stop * LANES)
         return np.minimum(numbers, self.gains.shape[0] - 1)
+
+
+@lru_cache(maxsize=2)
+def influence_of(config: Config) -> FloatArray:
+    """Deflection of midspan per force of each pole at rest, for all places of the train."""
+    return influence(guideway_model.build(config.guideway), train_model.build(config.train))
 
 
 def _batch(
@@ -317,9 +314,9 @@ def _on_tracks(
     return first, second
 
 
-RowOf = Callable[[int], tuple[tuple, BoolArray, FloatArray]]
-"""Arguments of the kernel for a row by its number, which of its samples the step is too large for,
-and their static deflection over that of the configuration (LANES,)."""
+RowOf = Callable[[int], tuple[tuple, BoolArray, dict[str, FloatArray]]]
+"""Of a row by its number: arguments of the kernel, for which of its samples the step is too large
+(LANES,), and what its responses are compared with."""
 
 
 def _block(batch: _Batch, rows: range) -> RowOf:
@@ -333,25 +330,28 @@ def _block(batch: _Batch, rows: range) -> RowOf:
 
     if batch.shape is None:
         too_fast = samples_too_fast(system.parts, gains, timing.time_step, system.safe_gains)
-        return lambda row: (_shared_arguments(batch, row), too_fast[lanes(row)], np.ones(LANES))
+        compared = compared_with(system.config, system.static_deflection, LANES)
+        return lambda row: (_shared_arguments(batch, row), too_fast[lanes(row)], compared)
     values = {key: of_all[numbers] for key, of_all in batch.values.items()}
     others = {key: values[key] for key in batch.shape.keys}
     own = own_trains(batch.shape, others, numbers.size)
+    influence = influence_of(system.config)
     too_fast = trains_too_fast(system.config, system.headroom, own.rates, gains, others)
 
-    def of_row(row: int) -> tuple[tuple, BoolArray, FloatArray]:
+    def of_row(row: int) -> tuple[tuple, BoolArray, dict[str, FloatArray]]:
         samples = lanes(row)
         spans, beyond = system.spans, np.zeros(LANES, dtype=bool)
-        stiffer, softer = np.ones(LANES), np.ones(LANES)
+        stiffer, softness = np.ones(LANES), np.ones(LANES)
         if batch.frame is not None:
             each = {key: one[samples] for key, one in values.items()}
             guideways = guideways_of(system.config, each, range(LANES))
-            spans, beyond, softer = own_spans(batch.frame, guideways)
+            spans, beyond, softness = own_spans(batch.frame, guideways)
             modulus = [one.rail.section.elastic_modulus for one in guideways]
             stiffer = np.array(modulus) / system.config.guideway.rail.section.elastic_modulus
         arguments = _own_arguments(batch, own, row, samples, spans, 1.0 / stiffer)
-        # a static deflection goes with the poles' force at rest and with the span's flexibility
-        return arguments, too_fast[samples] | beyond, own.sagging[0, samples] * softer
+        compared = own.compared_with(influence, system.config.guideway.span_length, samples)
+        compared["static_deflection"] *= softness
+        return arguments, too_fast[samples] | beyond, compared
 
     return of_row
 
@@ -452,7 +452,7 @@ def _gathered(
     system: System,
     timing: Timing,
     too_fast: BoolArray,
-    compared: Mapping[str, FloatArray],
+    compared: dict[str, FloatArray],
 ) -> Passages:
     n_cars = system.vehicle.body_z.size
     n_magnets = system.train.magnets.x.size

@@ -301,6 +301,8 @@ class OwnTrains:
         [m].
     level, sagging : (kind, sample)
         Factors on the irregularity and on the standing sag that magnets of a kind meet [-].
+    current_limit : (kind, sample)
+        Largest current of magnets that have not failed [A].
     rates
         What the time step has to follow.
     """
@@ -313,6 +315,7 @@ class OwnTrains:
     gap_lost: FloatArray
     level: FloatArray
     sagging: FloatArray
+    current_limit: FloatArray
     rates: Rates
 
     def vehicle(self, samples: slice) -> Vehicle:
@@ -328,6 +331,30 @@ class OwnTrains:
             own_link=vehicle.own_link._replace(rows=coefficients),
             own_pull=vehicle.own_pull._replace(rows=coefficients),
         )
+
+    def compared_with(
+        self, influence: FloatArray, span_length: float, samples: slice
+    ) -> dict[str, FloatArray]:
+        """What responses of a row of samples are compared with, for `Passages`.
+
+        Parameters
+        ----------
+        influence : (nose, magnet, pole)
+            From `maglev.mechanics.statics.influence`.
+        span_length
+            [m].
+        samples
+            Of the row.
+        """
+        rows = [self.trains.pole_force[k] for k in range(samples.start, samples.stop)]
+        flat = influence.reshape(influence.shape[0], -1)
+        force = [one[:, : influence.shape[2]].ravel() for one in rows]
+        return {
+            "gap_reference": np.stack([one.alike[samples, 0] for one in self.magnets], axis=1),
+            "current_limit": self.current_limit[:, samples].T,
+            "span_length": np.full(len(rows), span_length),
+            "static_deflection": np.array([(flat @ one).max() for one in force]),
+        }
 
     def kind(self, number: int, samples: slice) -> MagnetRows:
         """Magnets of one kind of a row of samples."""
@@ -389,6 +416,12 @@ def own_trains(shape: Shape, values: Mapping[str, FloatArray], n_samples: int) -
         gap_lost=each(own.passage.gap_lost),
         level=np.stack([each(one) for one in _levels(config, behind)]),
         sagging=np.stack([suspension.pole_force / rest[0], guidance.pole_force / rest[1]]),
+        current_limit=np.stack(
+            [
+                each(own.train.suspension_magnet.current_max),
+                each(own.train.guidance_magnet.current_max),
+            ]
+        ),
         rates=trains_model.rates(trains, own.train, shape.train.magnets),
     )
 

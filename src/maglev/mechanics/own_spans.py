@@ -20,7 +20,7 @@ from maglev.mechanics._records import Spans
 from maglev.mechanics.activity import Stretch, stepped_mass, stretches
 from maglev.mechanics.course import course
 from maglev.mechanics.guideway import GuidewayModel, build
-from maglev.mechanics.guideways import FAMILIES, Basis, Piece, lift_of, make_basis
+from maglev.mechanics.guideways import FAMILIES, Basis, Piece, make_basis
 from maglev.mechanics.own import aligned
 from maglev.mechanics.reduction import ReducedGuideway, reduce
 from maglev.mechanics.step_limit import (
@@ -85,6 +85,8 @@ class Frame:
         Numbers of the mean.
     fastest
         Largest squared circular frequency of the mean [1/s²].
+    softness
+        Of the mean's midspan [m/N].
     """
 
     config: Config
@@ -99,6 +101,7 @@ class Frame:
     record: Spans
     mean: Numbers | None
     fastest: float
+    softness: float
 
 
 @dataclass(frozen=True)
@@ -119,9 +122,9 @@ class Numbers:
     root: FloatArray
     midspan: FloatArray
     rest: FloatArray
-    lift: FloatArray
-    lift_rest: FloatArray
-    flexibility: float  # of midspan, its bearings included and its piers held [m/N]
+    opening: FloatArray
+    opening_rest: FloatArray
+    softness: float  # deflection of midspan under a unit force there [m/N]
     structure: FloatArray
     bearing: FloatArray
     tops: float  # largest squared circular frequency of the tops alone [1/s²]
@@ -181,9 +184,10 @@ def frame_of(config: Config, keys: tuple[str, ...]) -> Frame:
         record=spans,
         mean=None,
         fastest=fastest_square(reduced, dt),
+        softness=1.0,
     )
     mean = numbers_of(frame, config.guideway)
-    return replace(frame, mean=mean, record=_record(frame, mean))
+    return replace(frame, mean=mean, softness=mean.softness, record=_record(frame, mean))
 
 
 def _own_modes(
@@ -301,9 +305,9 @@ def numbers_of(frame: Frame, guideway: Guideway) -> Numbers:
         bearing=_by_bearings(frame, guideway, spans),
         midspan=_midspan(frame, sides),
         rest=_rest(frame, spans),
-        lift=_lift(frame, sides),
-        lift_rest=_lift_rest(frame, spans),
-        flexibility=float(basis.midspan[0] @ spans[0].static[:, 0]),
+        opening=_opening(frame, sides),
+        opening_rest=_opening_rest(frame, spans),
+        softness=_softness(frame, spans, stiffness),
         structure=structure,
         tops=tops,
         slowed=slowed,
@@ -428,56 +432,55 @@ def _midspan(frame: Frame, sides: Sequence[FloatArray]) -> FloatArray:
 def _rest(frame: Frame, spans: Pieces) -> FloatArray:
     """Motion of midspan that the modes of the middle span leave out, under forces on its rails."""
     kind, basis = frame.kinds[1], frame.basis
-    rests = []
-    for family, one in enumerate(spans):
-        places = kind.place[kind.family == family]
-        shape = one.shape[:, places]
-        modal = (shape.T @ basis.midspan[family]) / one.square[places]
-        rests.append(one.static[:, 0] - shape @ modal)
+    rests = [_left_out(kind, spans, family, basis.midspan[family], 0) for family in (0, 1)]
     return np.concatenate(
         [basis.rail[0].T @ rests[0], basis.rail[1].T @ rests[1], basis.rail[2].T @ rests[1]]
     )
 
 
-def _lift(frame: Frame, sides: Sequence[FloatArray]) -> FloatArray:
-    """Lift off the bearings per unit of each coordinate of the middle span and its tops.
+def _left_out(kind: Kind, spans: Pieces, family: int, load: FloatArray, number: int) -> FloatArray:
+    """Static shape (coordinate,) under a load by the modes of a kind of span that are left out."""
+    places = kind.place[kind.family == family]
+    shape = spans[family].shape[:, places]
+    modal = (shape.T @ load) / spans[family].square[places]
+    return spans[family].static[:, number] - shape @ modal
 
-    At each end the mean of right and left, then half their difference (4, coordinate), flat.
-    """
+
+def _opening(frame: Frame, sides: Sequence[FloatArray]) -> FloatArray:
+    """Opening of the middle span's bearings per unit coordinate, as `Spans.bearing` has it."""
     kind = frame.kinds[1]
     n = kind.family.size
     found = np.zeros((2, 2, n + 12))
-    for family in (0, 1):
+    for family, opening in enumerate(frame.basis.opening):
+        n_inner = sides[family].shape[0]
+        along = opening[:, :n_inner] @ sides[family]
+        along[:, -6:] += opening[:, n_inner:]
         mine = np.flatnonzero(kind.family == family)
-        n_shapes = sides[family].shape[0]
-        for end, rows in enumerate(frame.basis.ends[family]):
-            row = lift_of(rows)
-            along = row[:n_shapes] @ sides[family]
-            found[end, family, mine] = along[kind.place[mine]]
-            found[end, family, n + SPAN_TOPS[family]] = along[-6:] + row[n_shapes:]
+        found[:, family, mine] = along[:, kind.place[mine]]
+        found[:, family, n + SPAN_TOPS[family]] = along[:, -6:]
     return found.ravel()
 
 
-def _lift_rest(frame: Frame, spans: Pieces) -> FloatArray:
-    """Lift that the modes of the middle span leave out, under forces on its rails.
-
-    At each end the mean under z, then half the difference under roll and under y, flat.
-    """
-    kind, basis = frame.kinds[1], frame.basis
-    found = []
+def _opening_rest(frame: Frame, spans: Pieces) -> FloatArray:
+    """Opening of the middle span's bearings by left-out modes, as `Spans.bearing_rest` has it."""
+    basis, found = frame.basis, []
     for end in (0, 1):
-        rests = []
-        for family, one in enumerate(spans):
-            places = kind.place[kind.family == family]
-            shape = one.shape[:, places]
-            row = lift_of(basis.ends[family][end])[: shape.shape[0]]
-            rests.append(one.static[:, 1 + end] - shape @ ((shape.T @ row) / one.square[places]))
-        found += [
-            basis.rail[0].T @ rests[0],
-            basis.rail[1].T @ rests[1],
-            basis.rail[2].T @ rests[1],
-        ]
+        mean, half = (
+            _left_out(
+                frame.kinds[1], spans, k, basis.opening[k][end, : basis.midspan[k].size], 1 + end
+            )
+            for k in (0, 1)
+        )
+        found += [basis.rail[0].T @ mean, basis.rail[1].T @ half, basis.rail[2].T @ half]
     return np.concatenate(found)
+
+
+def _softness(frame: Frame, spans: Pieces, stiffness: FloatArray) -> float:
+    """Deflection of midspan under a unit force there [m/N]."""
+    even, midspan = spans[0], frame.basis.midspan[0]
+    tops = np.zeros(stiffness.shape[0])
+    tops[6 * (frame.config.guideway.n_spans // 2) + SPAN_TOPS[0]] = midspan @ even.constraint
+    return float(midspan @ even.static[:, 0] + tops @ np.linalg.solve(stiffness, tops))
 
 
 def _by_bearings(frame: Frame, guideway: Guideway, spans: Pieces) -> FloatArray:
@@ -586,9 +589,9 @@ def _carried_numbers(frame: Frame) -> IntArray:
 
 
 def own_spans(frame: Frame, guideways: Sequence[Guideway]) -> tuple[Spans, BoolArray, FloatArray]:
-    """Guideways of a row of samples, for which of them the step is too large, their flexibility.
+    """Guideways of a row of samples, for which of them the step is too large, and their softness.
 
-    The last is that of midspan over the mean's, by which a static deflection goes [-].
+    The softness of midspan is that over the mean's [-].
 
     Parameters
     ----------
@@ -613,15 +616,14 @@ def own_spans(frame: Frame, guideways: Sequence[Guideway]) -> tuple[Spans, BoolA
         damping_root=rows("root"),
         midspan=rows("midspan"),
         rest=rows("rest"),
-        bearing=rows("lift"),
-        bearing_rest=rows("lift_rest"),
+        bearing=rows("opening"),
+        bearing_rest=rows("opening_rest"),
         stretches=record.stretches._replace(
             factor=rows("factor"), factor_inverse=rows("factor_inverse")
         ),
     )
-    assert frame.mean is not None
-    flexibility = np.array([one.flexibility for one in found]) / frame.mean.flexibility
-    return spans, np.array([not one.holds for one in found]), flexibility
+    softer = np.array([one.softness for one in found]) / frame.softness
+    return spans, np.array([not one.holds for one in found]), softer
 
 
 def guideways_of(

@@ -25,12 +25,7 @@ from maglev.mechanics._records import (
 )
 from maglev.mechanics.activity import Stretch, stepped_mass, stretches, top_stiffness
 from maglev.mechanics.comfort import WEIGHTINGS, readings
-from maglev.mechanics.control import (
-    first_moving_step,
-    grouping,
-    late_current,
-    without_current,
-)
+from maglev.mechanics.control import first_moving_step, grouping, late_current, without_current
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile, mean_displacement
 from maglev.mechanics.lanes import LANES
@@ -389,9 +384,9 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
         midspan=midspan.ravel(),
         middle=middle,
         rest=np.concatenate([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
-        bearing=np.concatenate([_relative(reduced, middle, shape) for shape in reduced.bearing]),
-        bearing_rest=np.ascontiguousarray(reduced.bearing_rest).ravel(),
         in_order=np.arange(upright_column.size + sideways_column.size),
+        bearing=np.concatenate([_relative(reduced, middle, one) for one in reduced.bearing]),
+        bearing_rest=reduced.bearing_rest.ravel(),
         damping_column=damping_column,
         damping=damping,
         damping_root=np.zeros(0),

@@ -267,29 +267,24 @@ _FOUND: Mapping[Response, Callable[[Passages], Found]] = {
 def not_judged(config: Config, n_samples: int) -> Passages:
     """Passages without histories of a system for which the step is too large."""
     n_cars = config.train.n_cars
-    of_car, of_kind, alone = (np.full((n_samples, *more), np.nan) for more in ((n_cars,), (2,), ()))
-    none = np.empty((n_samples, 0, 0))
-    return Passages(
-        girder=np.full((n_samples, 4), np.nan),
-        girder_time=np.full((n_samples, 4), np.nan),
-        girder_positive=np.full((n_samples, 4), np.nan),
-        girder_negative=np.full((n_samples, 4), np.nan),
-        **dict.fromkeys(("body_z", "body_y", "body_z_time", "body_y_time"), of_car),
-        **dict.fromkeys(("end_z", "end_y", "end_z_time", "end_y_time"), of_car),
-        weighted=np.full((n_samples, len(WEIGHTINGS), n_cars), np.nan),
-        **dict.fromkeys(("lift", "lift_time"), alone),
+    more = {
+        "girder": (4,),
+        "body": (n_cars,),
+        "end": (n_cars,),
+        "weighted": (len(WEIGHTINGS), n_cars),
+        "gap": (2,),
+        "current": (2,),
+    }
+    known: dict[str, npt.NDArray] = {
         **compared_with(config, np.nan, n_samples),
-        **dict.fromkeys(("gap_min", "gap_max", "current_max"), of_kind),
-        status=np.full(n_samples, STEP_TOO_LARGE),
-        lost_time=alone,
-        lost_magnet=np.full(n_samples, -1),
-        time=np.empty(0),
-        girder_history=none,
-        body_z_history=none,
-        body_y_history=none,
-        gap_history=none,
-        current_history=none,
-    )
+        "status": np.full(n_samples, STEP_TOO_LARGE),
+        "lost_magnet": np.full(n_samples, -1),
+        "time": np.empty(0),
+    }
+    for name in (field.name for field in fields(Passages) if field.name not in known):
+        of_history = (0, 0) if name.endswith("_history") else more.get(name.split("_")[0], ())
+        known[name] = np.full((n_samples, *of_history), np.nan)
+    return Passages(**known)
 
 
 def in_their_order(parts: Sequence[Passages], rows: Sequence[IntArray]) -> Passages:

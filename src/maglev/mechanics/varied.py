@@ -32,7 +32,7 @@ _PLACES = (
     "train.car_body.end_distance",
     *(f"train.{kind}_magnet.{name}" for kind in ("suspension", "guidance") for name in _POLES),
 )
-"""Numbers of the train that say where poles are: tables of the whole run stand on them."""
+"""Numbers of the train that say where poles and ends of cars are, which all samples share."""
 
 _ALIKE = (
     "passage.gap_contact",
