@@ -328,12 +328,20 @@ def test_a_limit_state_written_in_full_replaces_the_shipped_one():
     assert_allclose(mine.threshold, 0.5)
     assert (mine.drives, mine.target, mine.source) == (True, None, "")
     assert "ride" not in from_mapping({"limit_states": {"ride": None}}).limit_states
+    state = {"response": "car_body_acceleration_z", "limit": "25e-2"}  # a number to no YAML
+    with pytest.raises(ConfigError, match=r"limit must carry its unit, such as '0.25 m/s\^2'"):
+        from_mapping({"limit_states": {"mine": state}})
 
 
 def test_a_threshold_moves_no_part_but_that_of_the_limit_states():
     def parts(limit, name="ride"):
         own = {"response": "girder_displacement_y", "limit": "1 m"}
-        config = from_mapping({"limit_states": {"ride": {"limit": limit}, "sway": own}})
+        config = from_mapping(
+            {
+                "study": {"responses": ["girder_displacement_z"]},
+                "limit_states": {"ride": {"limit": limit}, "sway": own},
+            }
+        )
         part = named(name).slice(config, "validation", "asm")
         again = from_mapping(part)  # as the stage reads it
         assert named(name).slice(again, "validation", "asm") == part

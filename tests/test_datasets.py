@@ -31,6 +31,7 @@ def filled(layout):
     sizes |= {"method": 2, "failure_probability": 3, "round": 2, "step": 3, "cell": 5, "check": 2}
     sizes |= {"source": 2, "grid_derivative": 2, "grid_proportional": 3}
     sizes |= {"train_part": 9, "current_lag": 2, "track": 3, "curve": 2, "beam_frequency": 4}
+    sizes |= {"path_step": 13, "quantile_level": 3}
     sizes |= {"case": 2, "limit_state": 3}
     names = [*LAYOUTS[layout].variables, *LAYOUTS[layout].optional]
     of = {name: LAYOUTS[layout].variable(name) for name in names}

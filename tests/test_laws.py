@@ -5,10 +5,10 @@ import openturns as ot
 import pytest
 from numpy.testing import assert_allclose
 
-from maglev.config import from_mapping
+from maglev.config import from_mapping, load_config
 from maglev.errors import ConfigError
 from maglev.laws import distribution
-from maglev.parameters import Law
+from maglev.parameters import Config, Law
 
 
 def made(**law):
@@ -140,3 +140,43 @@ def test_mass_where_the_model_makes_no_sense_is_refused_with_its_probability():
                                                      "high": "10 mm"}}  # fmt: skip
     with pytest.raises(ConfigError, match=r"4 % of the law lies where .* must lie between passage"):
         from_mapping({"cases": {"a": {"random": law}}})
+
+
+def test_a_sample_is_read_from_the_file_that_the_configuration_names(tmp_path):
+    (tmp_path / "masses.csv").write_text(
+        "mass [t],car\n" + "\n".join(f"{m},1" for m in range(29, 40))
+    )
+    random = "{train.car_body.mass: {law: sample, file: masses.csv}}"
+    (tmp_path / "a.yaml").write_text(f"cases: {{a: {{random: {random}}}}}")
+    config = load_config(tmp_path / "a.yaml")
+    assert_allclose(config.distribution("a", "train.car_body.mass").ppf([0.0, 0.5]), [29e3, 34e3])
+    for text, sentence in (
+        ("29\n30\n", r"masses\.csv, line 1: expected a heading such as 'mass \[t\]'"),
+        ("mass [t]\n29\nheavy\n", r"masses\.csv, line 3: expected a number, got 'heavy'"),
+    ):
+        (tmp_path / "masses.csv").write_text(text)
+        with pytest.raises(ConfigError, match=sentence):
+            load_config(tmp_path / "a.yaml")
+
+
+def test_a_sweep_makes_cases_of_one_and_reads_back_the_same():
+    over = {"passage.speed": ["300 km/h", "400 km/h"], "guideway.n_spans": [3, 5, 7]}
+    config = from_mapping({"only": ["a"], "cases": {"a": {"sweep": over, "methods": ["asm"]}}})
+    assert list(config.cases) == ["a", *(f"a_{j}_{k}" for j in (1, 2) for k in (1, 2, 3))]
+    made = config.of_case("a_2_3")
+    assert_allclose(made.passage.speed, 400 / 3.6)
+    assert made.guideway.n_spans == 7
+    again = Config.model_validate(config.quantities())
+    assert again.cases == config.cases
+    for wrong, sentence in (
+        ({"passage.speed": ["300 km/h"]}, "needs at least two values, got 1"),
+        ({"gains.suspension_derivative": ["10 A s/m", "20 A s/m"]}, "is both swept and random"),
+        ({"passage.speed": ["300 km/h", "400 kg"]}, "must be given in m/s"),
+    ):
+        with pytest.raises(ConfigError, match=sentence):
+            from_mapping({"cases": {"a": {"sweep": wrong}}})
+
+
+def test_a_case_whose_tracks_differ_is_counted_only():
+    case = from_mapping({"cases": {"a": {"track": "random", "methods": ["mcm", "asm"]}}}).cases["a"]
+    assert case.possible_methods == ("mcm",)

@@ -107,6 +107,7 @@ def test_a_dry_run_of_all_lists_every_step_of_the_method(fresh):
         "figures_random_track": 1, "figures_fast": 1, "figures_fast_1": 1, "figures_fast_2": 1,
         "mean_run": 2, "sweep": 1,
         "tracks": 1, "line": 1, "fig_tracks": 1, "fig_track_limits": 1,
+        "density_in_time": 1, "fig_in_time": 1,
     }.items()  # fmt: skip
     assert fresh.would_run() == jobs
 
@@ -129,7 +130,7 @@ cases:
   mine: {{n_spans: 1, {more}}}
 """
 OF_PAPER = (
-    "table1", "paper_and_ours", "control_study", "tracks", "line", "track_split",
+    "table1", "paper_and_ours", "control_study", "tracks", "line", "fig_in_time",
     *(f"fig{number}" for number in range(9, 17)),
 )  # fmt: skip
 """What compares cases that are not there."""
@@ -146,9 +147,14 @@ OF_PAPER = (
             "density exceedance limits sobol_asm scatter accuracy prediction".split(),
         ),
         (
-            "methods: [asm], track: random, sweep: {passage.speed: [400 km/h, 430 km/h]}",
+            "methods: [asm], sweep: {passage.speed: [400 km/h, 430 km/h]}",
             ["mine_1", "mine_2"],
             ["density", "exceedance", "limits", "sobol_asm"],
+        ),
+        (
+            "methods: [mcm, asm], track: random",
+            ["mine"],
+            ["density", "exceedance", "limits", "scatter", "track_split"],
         ),
     ],
 )

@@ -6,8 +6,12 @@ A configuration file says only what differs from the defaults, or from the file 
 
 from __future__ import annotations
 
+import copy
+import csv
 import difflib
+import math
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import UnionType
@@ -205,11 +209,66 @@ def from_mapping(mapping: Mapping[str, Any]) -> Config:
     >>> from_mapping({"passage": {"speed": "360 km/h"}}).passage.speed
     100.0
     """
-    config: Config = validated(Config, overlay(Config().quantities(), mapping))
+    whole = overlay(Config().quantities(), mapping)
     for path, name in named_files(mapping):
         if not Path(name).is_file():
             raise ConfigError(f"{'.'.join(path)} names a file that does not exist: {name}")
+        if path[-1] == "file":
+            whole = _with_sample(whole, path[:-1], name)
+    config: Config = validated(Config, whole)
     return config
+
+
+def _with_sample(whole: dict[str, Any], path: Sequence[str], name: str) -> dict[str, Any]:
+    """The values of a sample in place of the name of its file."""
+    law: Any = whole
+    for part in path:
+        law = law[part]
+    held = {key: value for key, value in law.items() if key != "file"}
+    nested: Any = {**held, "values": sample_values(name)}
+    *outer, last = path
+    target = whole = copy.deepcopy(whole)
+    for part in outer:
+        target = target[part]
+    target[last] = nested
+    return whole
+
+
+def sample_values(path: str | Path) -> list[str | float]:
+    """Values of a sample from the first column of a CSV file, with the unit of its heading.
+
+    Parameters
+    ----------
+    path
+        A heading such as ``mass [t]``, or ``ratio`` for a pure number, then a number a line.
+
+    Returns
+    -------
+    values
+        As a configuration file writes them.
+
+    Raises
+    ------
+    ConfigError
+        If there is no heading, or a line begins with something else than a finite number.
+    """
+    with Path(path).open(encoding="utf-8-sig", newline="") as stream:
+        rows = [row for row in csv.reader(stream) if row and any(cell.strip() for cell in row)]
+    heading = rows[0][0].strip() if rows else ""
+    found = re.fullmatch(r"[^\[\]]*[^\W\d][^\[\]]*(\[(?P<unit>[^\[\]]+)\])?", heading)
+    if found is None:
+        raise ConfigError(f"{path}, line 1: expected a heading such as 'mass [t]', got '{heading}'")
+    unit = (found["unit"] or "").strip()
+    values: list[str | float] = []
+    for number, row in enumerate(rows[1:], start=2):
+        try:
+            value = float(row[0])
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise ConfigError(f"{path}, line {number}: expected a number, got '{row[0]}'")
+        values.append(f"{value!r} {unit}" if unit and unit != "-" else value)
+    return values
 
 
 def validated(model: type[Any], mapping: Mapping[str, Any]) -> Any:
@@ -256,6 +315,37 @@ def load_config(*paths: str | Path) -> Config:
     for path in paths:
         mapping = overlay(mapping, read_overlays(path))
     return from_mapping(mapping)
+
+
+def layered(
+    paths: Sequence[str | Path], over: Mapping[str, Any], lowest: str | Path
+) -> dict[str, Any]:
+    """Values of configuration files laid over each other, as the workflow is given them.
+
+    Parameters
+    ----------
+    paths
+        Files in rising order; names of files in each are relative to it.
+    over
+        Values that lie over all files.
+    lowest
+        File below all others, unless one of them says what it extends.
+
+    Returns
+    -------
+    mapping
+        For `from_mapping`.
+
+    Raises
+    ------
+    ConfigError
+        As `read_overlays`.
+    """
+    near = [os.path.relpath(path) for path in paths]
+    below = {} if any("extends" in read_yaml(path) for path in near) else read_overlays(lowest)
+    for path in near:
+        below = overlay(below, read_overlays(path))
+    return overlay(below, over)
 
 
 def config_text(mapping: Mapping[str, Any], directory: str | Path = ".") -> str:

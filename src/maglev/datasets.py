@@ -23,19 +23,25 @@ import xarray as xr
 from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.vocabulary import (
+    BARRIER_SOURCES,
+    CAR_RESPONSES,
     DECISIONS,
     DENSITY_METHODS,
     GAIN_UNITS,
     GAINS,
     GROUPS,
     LIMIT_STATUS,
+    PAPER_RESPONSES,
+    RESPONSE_TABLE,
     RESPONSE_UNITS,
-    RESPONSE_WORDS,
     RESPONSES,
+    SIGNED_RESPONSES,
     SOURCES,
     STATUS,
     SURROGATES,
+    TIMED_RESPONSES,
     TRAIN_PARTS,
+    ResponseEntry,
 )
 
 CONVENTIONS = "CF-1.11"
@@ -179,23 +185,8 @@ def _model_table() -> dict[str, Variable]:
     }
     for name, unit in GAIN_UNITS.items():
         table[name] = _number("sample", unit, f"{name.replace('_', ' ')} of the magnets")
-    for name, meaning in RESPONSE_WORDS.items():
-        unit = RESPONSE_UNITS[name]
-        table[name] = _number("sample", unit, f"largest absolute {meaning}")
-        table[f"{name}_t"] = _number("sample", "s", f"time of the largest absolute {meaning}")
-        of_car = name.startswith("car_body")
-        table[f"{name}_history"] = _number(
-            "sample car t" if of_car else "sample t",
-            unit,
-            meaning.replace(", largest over the cars", ""),
-            "float32",
-        )
-        if of_car:
-            table[f"{name}_per_car"] = _number(
-                "sample car",
-                unit,
-                f"largest absolute {meaning.replace(', largest over the cars', '')}",
-            )
+    for name, entry in RESPONSE_TABLE.items():
+        table |= _response_variables(name, entry)
     for kind in ("suspension", "guidance"):
         for end, word in (("min", "smallest"), ("max", "largest")):
             table[f"{kind}_gap_{end}"] = _number("sample", "m", f"{word} gap of any {kind} pole")
@@ -287,6 +278,26 @@ def _model_table() -> dict[str, Variable]:
     table["measured_deflection"] = _number(
         "measured_speed", "m", "largest vertical deflection at midspan measured on the line"
     )
+    return table
+
+
+def _response_variables(name: str, entry: ResponseEntry) -> dict[str, Variable]:
+    """Variables of a response: its value, and what is kept beside it."""
+    of_one = entry.words.replace(", largest over the cars", "")
+    motion = of_one.removeprefix("largest absolute ")
+    table = {name: _number("sample", entry.unit, entry.words)}
+    if entry.timed:
+        table[f"{name}_t"] = _number("sample", "s", f"time of the {entry.words}")
+    if entry.kind == "car":
+        table[f"{name}_per_car"] = _number("sample car", entry.unit, of_one)
+    if name in PAPER_RESPONSES:
+        dims = "sample car t" if entry.kind == "car" else "sample t"
+        table[f"{name}_history"] = _number(dims, entry.unit, motion, "float32")
+    if name in SIGNED_RESPONSES:
+        side = "downwards" if name.endswith("_z") else "to the right"
+        other = "upwards" if name.endswith("_z") else "to the left"
+        table[f"{name}_positive"] = _number("sample", entry.unit, f"largest {motion}, {side}")
+        table[f"{name}_negative"] = _number("sample", entry.unit, f"largest {motion}, {other}")
     return table
 
 
@@ -661,6 +672,55 @@ def _study_table() -> dict[str, Variable]:
         "lost_share_on_track": _number(
             "track", "1", "share of the points of the gains at which levitation is lost"
         ),
+        # responses over the time of a passage
+        "path_step": _number(
+            "path_step", "1", "number of the place along the path, every third at a time", "int32"
+        ),
+        "path": _number(
+            "sample response path_step",
+            OF_RESPONSE,
+            "response at each time, and its two turning points between two times; that of a car "
+            "body is its size, largest over the cars",
+        ),
+        "extreme_of_path": _number("sample response", OF_RESPONSE, "largest absolute response"),
+        "quantile_level": _number("quantile_level", "1", "probability that is not exceeded"),
+        "value_in_time": _number("response t cell", OF_RESPONSE, "response"),
+        "density_in_time": _number(
+            "response t cell",
+            PER_RESPONSE,
+            "probability density of the response of held samples at the time, by the GDEE",
+        ),
+        "held_in_time": _number("t", "1", "probability that levitation has held until the time"),
+        "mean_in_time": _number("response t", OF_RESPONSE, "mean of the response of held samples"),
+        "deviation_in_time": _number(
+            "response t", OF_RESPONSE, "standard deviation of the response of held samples"
+        ),
+        "quantile_in_time": _number(
+            "response t quantile_level", OF_RESPONSE, "quantile of the response of held samples"
+        ),
+        "kernel_in_time": _number(
+            "response t", OF_RESPONSE, "standard deviation that the scheme adds to each point"
+        ),
+        "nose": _number("t", "m", "place of the train's nose along travel, from the first pier"),
+        "train_length": _number("", "m", "length of the train"),
+        "guideway_length": _number("", "m", "length of the guideway, all spans"),
+        "barrier": _number(level, OF_RESPONSE, "size of the response that must not be reached"),
+        "barrier_source": _code(level, "what the barrier is", BARRIER_SOURCES),
+        "reliability": _number(
+            f"{level} t",
+            "1",
+            "probability that the barrier was not reached and levitation held until the time, by "
+            "the GDEE with absorbing barriers",
+        ),
+        "reliability_of_points": _number(
+            f"{level} t", "1", "the same share of the weighted histories themselves"
+        ),
+        "reliability_of_extreme": _number(
+            level, "1", "probability that the extreme stays below the barrier and levitation holds"
+        ),
+        "reliability_error": _number(
+            level, "1", "reliability at the end of the passage less that of the extreme"
+        ),
         # sweeps
         "setting": _words("setting", "case that a sweep has made"),
         "swept_parameter": _words("swept_parameter", "dotted key that is swept"),
@@ -853,9 +913,9 @@ class Layout:
 _EXTREMES = (
     *GAINS,
     *RESPONSES,
-    *(f"{name}_t" for name in RESPONSES),
-    "car_body_acceleration_z_per_car",
-    "car_body_acceleration_y_per_car",
+    *(f"{name}_t" for name in TIMED_RESPONSES),
+    *(f"{name}_per_car" for name in CAR_RESPONSES),
+    *(f"{name}_{part}" for name in SIGNED_RESPONSES for part in ("positive", "negative")),
     "suspension_gap_min",
     "suspension_gap_max",
     "guidance_gap_min",
@@ -867,7 +927,7 @@ _EXTREMES = (
     "lost_magnet",
 )
 _HISTORIES = (
-    *(f"{name}_history" for name in RESPONSES),
+    *(f"{name}_history" for name in PAPER_RESPONSES),
     "gap_history",
     "current_history",
     "magnet_kind",
@@ -1209,6 +1269,33 @@ LAYOUTS: Mapping[str, Layout] = {
             "n_runs",
         ),
     ),
+    "histories": Layout(
+        title="Histories of responses, thinned",
+        variables=(*GAINS, "path", "extreme_of_path", "status", "lost_t"),
+        optional=("track_seed",),
+    ),
+    "density_in_time": Layout(
+        title="Density and first-passage reliability of responses over the time of a passage",
+        variables=(
+            "value_in_time",
+            "density_in_time",
+            "held_in_time",
+            "mean_in_time",
+            "deviation_in_time",
+            "quantile_in_time",
+            "kernel_in_time",
+            "nose",
+            "train_length",
+            "guideway_length",
+            "barrier",
+            "barrier_source",
+            "reliability",
+            "reliability_of_points",
+            "reliability_of_extreme",
+            "reliability_error",
+            "n_runs",
+        ),
+    ),
     "table1": Layout(
         title="Limits of the extremes by each method",
         variables=(
@@ -1258,7 +1345,7 @@ def _units_of_rows(dataset: xr.Dataset) -> dict[str, list[str]]:
     """Unit of each response and of each limit state of a dataset, by dimension."""
     names = {"response": "response", "limit_state": "state_response"}
     return {
-        dim: [str(RESPONSE_UNITS.get(str(one), "1")) for one in dataset[name].to_numpy()]  # type: ignore[call-overload]
+        dim: [str(RESPONSE_UNITS.get(str(one), "1")) for one in dataset[name].to_numpy()]
         for dim, name in names.items()
         if name in dataset.variables
     }
@@ -1459,7 +1546,6 @@ def write_netcdf(dataset: xr.Dataset, path: str | Path) -> None:
         encoding[name] = {"dtype": dtype, "_FillValue": None}
         if ordered[name].ndim:
             encoding[name] |= {"zlib": True, "complevel": 4, "shuffle": True}
-        ordered[name].encoding = {}
     aside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         ordered.to_netcdf(aside, engine="netcdf4", format="NETCDF4", encoding=encoding)

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from maglev import datasets, profiles
 from maglev.arrays import FloatArray, IntArray
-from maglev.errors import UserError
+from maglev.errors import StepTooLarge, UserError
 from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
@@ -27,8 +27,10 @@ from maglev.mechanics.responses import (
     Passages,
     checked_gains,
     in_their_order,
+    not_judged,
+    responses,
 )
-from maglev.mechanics.varied import checked_values, cost_of, equal_samples
+from maglev.mechanics.varied import beyond_the_basis, checked_values, cost_of, equal_samples
 from maglev.parameters import Config
 
 KEPT_TRACKS = 64
@@ -42,7 +44,7 @@ highest frequency in the band of the responses."""
 def simulate(
     config: Config,
     gains: npt.ArrayLike,
-    histories: bool = False,
+    histories: bool | Literal["responses"] = False,
     solver: Literal["production", "reference"] = "production",
     *,
     values: Mapping[str, npt.ArrayLike] | None = None,
@@ -62,7 +64,8 @@ def simulate(
         Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m]; then suspension k_a
         [A s²/m], k_i [A/(m s)], guidance k_a, k_i, those of ``config.gains`` if left out.
     histories
-        Whether to keep the time series of responses, gaps and currents.
+        Whether to keep the time series of responses, gaps and currents; ``"responses"``: without
+        gaps and currents, which are most of their size.
     solver
         ``"production"``: compiled, many samples at once; ``"reference"``: full finite elements with
         a step of its own, halved until the extremes are right to 0.1 %, some thousand times slower.
@@ -80,14 +83,15 @@ def simulate(
     Returns
     -------
     passages
-        Layout ``passage`` of `maglev.datasets`: on ``sample`` the extremes of the six responses
-        [m, m s-2] and their times [s], gaps [m], currents [A], ``status`` and where and when
-        levitation was lost; with ``histories`` also the time series on ``t``.  The extremes of a
-        lost sample are NaN, as are those of a sample whose gains ask for a smaller step, which is
-        not judged (status ``step_too_large``).  Attributes ``time_step`` [s], ``n_steps``, both
-        the largest of any sample, and ``track``, the words for the track that the numbers are of;
-        of the reference solver also
-        ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
+        Layout ``passage`` of `maglev.datasets`: on ``sample`` the responses of
+        `maglev.vocabulary.RESPONSE_TABLE` and the times of those that have one [s], gaps [m],
+        currents [A], ``status`` and where and when levitation was lost; with ``histories`` also the
+        time series on ``t``.  The responses of a lost sample are NaN, as are those of a sample
+        whose gains ask for a smaller step, which is not judged (status ``step_too_large``).
+        Attributes ``time_step`` [s], ``n_steps``, both the largest of any sample, and ``track``,
+        the words for the track that the numbers are of; of the reference solver also
+        ``estimated_error``, the largest of the six responses of the paper as a share of it, and
+        ``seconds``.
 
     Raises
     ------
@@ -118,6 +122,8 @@ def simulate(
     'completed'
     """
     gains = checked_gains(gains, config.gains.further)
+    if histories not in (False, True, "responses"):
+        raise UserError(f"histories must be False, True or 'responses', got {histories!r}")
     if solver not in ("production", "reference"):
         raise UserError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
@@ -151,10 +157,15 @@ def simulate(
 
 @dataclass(frozen=True)
 class _Group:
-    """Samples that share a system: their numbers, its configuration, what else each has its own."""
+    """Samples that share a system.
+
+    Their numbers, its configuration, whether that is not the one given, and what else each has of
+    its own.
+    """
 
     rows: IntArray
     config: Config
+    anew: bool
     own: tuple[str, ...]
 
 
@@ -164,17 +175,28 @@ def _groups(
     """Samples in groups of equal values of what is built anew; all of it for the reference."""
     cost = cost_of(config, values)
     built = [key for key in values if cost[key] == "rebuild" or solver == "reference"]
-    built = list(values)
     own = tuple(key for key in values if key not in built)
+    anew = np.zeros(n_samples, dtype=bool)
+    for key in own:
+        if cost[key] == "guideway":
+            anew |= beyond_the_basis(config, key, values[key])
+    for sample in range(n_samples if own else 0):  # refused before anything is computed
+        numbers = {key: float(values[key][sample]) for key in values}
+        config.with_numbers(numbers, f"sample {sample}: ")
+    columns = [values[key] for key in built]
+    columns += [np.where(anew, values[key], 0.0) for key in own if cost[key] == "guideway"]
     found = []
-    for rows in equal_samples([values[key] for key in built], n_samples):
-        numbers = {key: float(values[key][rows[0]]) for key in built}
-        place = f"sample {rows[0]}: " if built else ""
-        found.append(_Group(rows, config.with_numbers(numbers, place) if built else config, own))
+    for rows in equal_samples([*columns, anew], n_samples):
+        whole = [key for key in own if anew[rows[0]] and cost[key] == "guideway"]
+        numbers = {key: float(values[key][rows[0]]) for key in [*built, *whole]}
+        place = f"sample {rows[0]}: "
+        of_group = config.with_numbers(numbers, place) if numbers else config
+        rest = tuple(key for key in own if key not in whole)
+        found.append(_Group(rows, of_group, bool(numbers), rest))
     return found
 
 
-def _refuse_unequal_histories(groups: Sequence[_Group], histories: bool) -> None:
+def _refuse_unequal_histories(groups: Sequence[_Group], histories: bool | str) -> None:
     """Refuse histories of samples whose steps or magnets are not the same."""
     ways = {(course(one.config).time_step, course(one.config).n_steps) for one in groups}
     trains = {one.config.train.n_cars for one in groups}
@@ -189,7 +211,7 @@ def _run(
     group: _Group,
     gains: FloatArray,
     values: Mapping[str, FloatArray],
-    histories: bool,
+    histories: bool | str,
     solver: str,
     seeds: list[int] | None,
     n_threads: int,
@@ -207,11 +229,19 @@ def _run(
         return passages, effort.attributes
     step = course(config).time_step
     every = max(1, int(HISTORY_INTERVAL / step * (1 + 1e-9))) if histories else 0
+    try:
+        system = _system(config, _track_file_hash(config))
+    except StepTooLarge:
+        if not group.anew or histories:  # the configuration's own step, or no histories to give
+            raise
+        return not_judged(config, rows.size), {}
     passages = integrate.integrate(
-        _system(config, _track_file_hash(config)),
+        system,
         gains[rows],
+        values={key: values[key][rows] for key in group.own},
         profile_of=None if seeds is None else _tracks_of(config, [seeds[k] for k in rows]),
         record_every=every,
+        with_magnets=histories != "responses",
         n_threads=n_threads,
         on_progress=on_progress,
     )
@@ -308,26 +338,16 @@ def _system(config: Config, _track_file: str) -> integrate.System:
 
 
 def _dataset(
-    groups: Sequence[_Group], gains: FloatArray, passages: Passages, histories: bool
+    groups: Sequence[_Group], gains: FloatArray, passages: Passages, histories: bool | str
 ) -> xr.Dataset:
     one, config = ("sample",), groups[0].config
     ways = [course(group.config) for group in groups]
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)
     }
-    for k, name in enumerate(GIRDER_RESPONSES):
-        variables[name] = (one, passages.girder[:, k])
-        variables[f"{name}_t"] = (one, passages.girder_time[:, k])
-    cars = np.arange(passages.body_z.shape[1])
-    for axis, extreme, when in (
-        ("z", passages.body_z, passages.body_z_time),
-        ("y", passages.body_y, passages.body_y_time),
-    ):
-        name = f"car_body_acceleration_{axis}"
-        worst = np.where(np.isnan(extreme), -1.0, extreme).argmax(axis=1)[:, None]
-        variables[name] = (one, np.take_along_axis(extreme, worst, axis=1)[:, 0])
-        variables[f"{name}_t"] = (one, np.take_along_axis(when, worst, axis=1)[:, 0])
-        variables[f"{name}_per_car"] = (("sample", "car"), extreme)
+    for name, found in responses(passages).items():
+        for part, values in found.parts.items():
+            variables[f"{name}{part}"] = (one if values.ndim == 1 else ("sample", "car"), values)
     for k, kind in enumerate(("suspension", "guidance")):
         variables[f"{kind}_gap_min"] = (one, passages.gap_min[:, k])
         variables[f"{kind}_gap_max"] = (one, passages.gap_max[:, k])
@@ -335,13 +355,18 @@ def _dataset(
     variables["status"] = (one, passages.status)
     variables["lost_t"] = (one, passages.lost_time)
     variables["lost_magnet"] = (one, passages.lost_magnet)
-    coordinates: dict[str, npt.NDArray] = {"sample": np.arange(gains.shape[0]), "car": cars}
+    coordinates: dict[str, npt.NDArray] = {
+        "sample": np.arange(gains.shape[0]),
+        "car": np.arange(passages.body_z.shape[1]),
+    }
     if histories:
         for k, name in enumerate(GIRDER_RESPONSES):
             variables[f"{name}_history"] = (("sample", "t"), passages.girder_history[:, k])
         of_car = ("sample", "car", "t")
         variables["car_body_acceleration_z_history"] = (of_car, passages.body_z_history)
         variables["car_body_acceleration_y_history"] = (of_car, passages.body_y_history)
+        coordinates |= {"t": passages.time}
+    if histories and histories != "responses":
         of_magnet = ("sample", "magnet", "t")
         variables["gap_history"] = (of_magnet, passages.gap_history)
         variables["current_history"] = (of_magnet, passages.current_history)
@@ -349,7 +374,7 @@ def _dataset(
         variables["magnet_kind"] = (("magnet",), magnets.is_guidance.astype(np.int8))
         variables["magnet_side"] = (("magnet",), magnets.side)
         variables["magnet_x"] = (("magnet",), magnets.x)
-        coordinates |= {"magnet": np.arange(magnets.x.size), "t": passages.time}
+        coordinates |= {"magnet": np.arange(magnets.x.size)}
     return xr.Dataset(
         variables,
         coords=coordinates,

@@ -320,6 +320,41 @@ def line(n=5):
     return _filled("line", sizes, **given).assign_attrs(track=f"{n} tracks")
 
 
+def in_time(n=3):
+    """Responses that swing and spread, n of them, with barriers that are reached half-way."""
+    t, z = np.linspace(0, 3, 61), np.linspace(-5, 5, 41)
+    swing = np.sin(4 * t) * CENTRE[:n, None]
+    width = WIDTH[:n, None] * (0.01 + np.abs(np.sin(t)))
+    by_time, by_level = ("response", "t"), ("response", "failure_probability")
+    shown = ("response", "t", "cell")
+    late = 1 - np.array(LEVELS)[:, None] * (t > 1.5)
+    given = {
+        "response": ("response", np.array(PAPER_RESPONSES[:: 6 // n][:n])),
+        "t": ("t", t),
+        "value_in_time": (shown, swing[..., None] + width[..., None] * z),
+        "density_in_time": (shown, stats.norm.pdf(z) / width[..., None]),
+        "held_in_time": ("t", np.ones(t.size)),
+        "mean_in_time": (by_time, swing),
+        "deviation_in_time": (by_time, width),
+        "quantile_in_time": (
+            (*by_time, "quantile_level"), swing[..., None] + width[..., None] * [-2, 0, 2]
+        ),
+        "quantile_level": ("quantile_level", [0.025, 0.5, 0.975]),
+        "nose": ("t", -100 + 120 * t),
+        "train_length": ((), 124.0),
+        "guideway_length": ((), 124.0),
+        "barrier": (by_level, np.outer(CENTRE[:n], [1.1, 1.2, 1.3])),
+        "reliability": ((*by_level, "t"), np.tile(late, (n, 1, 1))),
+        "reliability_of_points": ((*by_level, "t"), np.tile(late, (n, 1, 1))),
+        "reliability_of_extreme": (by_level, np.tile(1 - np.array([*LEVELS[:2], 0.0]), (n, 1))),
+        "n_runs": ((), 64),
+    }  # fmt: skip
+    sizes = {
+        "response": n, "t": t.size, "cell": z.size, "failure_probability": 3, "quantile_level": 3,
+    }  # fmt: skip
+    return _filled("density_in_time", sizes, **given)
+
+
 def circuits(group="pole", lag="0 s"):
     """Both kinds of magnet with such circuits, as a configuration is written."""
     return {
@@ -422,4 +457,5 @@ def study(folder, demonstration=False):
         "track_split": [one("track_split", track_split())],
         "tracks": [one("line", line())],
         "track_limits": [one("line", line())],
+        "in_time": [one("density_in_time", in_time())],
     }

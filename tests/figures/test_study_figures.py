@@ -2,6 +2,7 @@
 
 import json
 from importlib import import_module
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -22,10 +23,12 @@ from maglev.figures import (
     draw,
     exceedance,
     exceedance_by_method,
+    in_time,
     labels,
     layouts_of,
     limits,
     limits_by_control,
+    prediction,
     stability,
     style,
     sweep,
@@ -87,6 +90,16 @@ def test_any_number_of_responses_has_panels_in_rows_of_three():
     assert [labels.lowest(number, data) for number in range(8)] == [False] * 5 + [True] * 3
 
 
+def test_predictions_of_more_responses_than_a_row_holds_go_on_below(files):
+    (data,) = read(files["prediction"], "prediction")
+    more = data.isel(response=[*range(6), 0, 1])
+    fig, _ = prediction.figure(more)
+    panels = [axis for axis in fig.axes if axis.get_xlabel() != "runs in a cell"]
+    assert len(panels) == 3 * 8
+    assert len({axis.get_ylabel() for axis in panels} - {""}) == 3
+    fig.savefig(BytesIO())  # rows stand where they belong
+
+
 def test_limits_stand_on_the_exceedance_with_their_probability(tmp_path, files):
     draw("exceedance", files["exceedance"], tmp_path / "f")
     n = len(files["exceedance"]) // 2
@@ -100,7 +113,7 @@ def test_limits_stand_on_the_exceedance_with_their_probability(tmp_path, files):
     fig, _ = exceedance.figure(densities, states)
     words = [[text.get_text() for text in axis.texts] for axis in fig.axes]
     assert words[2][0] == "low, 0.55 m/s²" and words[2][1] == "MCM P = 16 [12.8, 19.2] %"
-    assert words[4][0] == "far, 5 m/s² (right of the panel)"
+    assert words[4][0] == "far, 5 m/s² →"
     assert words[0] == words[1] == words[5] == []
     with pytest.raises(ValueError, match="must be of the same methods"):
         exceedance.figure(densities, states[::-1])
@@ -361,6 +374,27 @@ def test_a_run_that_was_not_judged_is_marked_and_not_counted_as_lost(files):
         chart.get_legend_handles_labels()[1]
     )
     assert count.get_title(loc="left").startswith("(b) lost 1 of")
+
+
+def test_a_response_in_time_has_three_panels_and_its_errors_are_said(files):
+    data = datasets.read(files["in_time"][0], "density_in_time")
+    data["reliability_error"][:] = -0.004
+    fig, plotted = in_time.figure(data.isel(response=[0]))
+    assert fig.get_size_inches()[0] == style.COLUMN
+    titles = [axis.get_title(loc="left") for axis in fig.axes]
+    assert titles[:3] == [
+        "(a) midspan displacement, vert.",
+        "(b) density about the mean",
+        "(c) failure by first passage, 1 - R(t)",
+    ]
+    words = [text.get_text() for text in fig.axes[2].get_legend().get_texts()]
+    assert words[0] == f"{1.1e3 * study_files.CENTRE[0]:.4g} mm (0.1), error +0.004"
+    # nothing is known of the extreme beyond the last barrier: no circle
+    circles = [line for line in fig.axes[2].get_lines() if line.get_marker() == "o"]
+    assert len(circles) == 2
+    xr.testing.assert_identical(plotted, data.isel(response=[0]))
+    fig, _ = in_time.figure(data)  # the third leaves the place of a fourth empty
+    assert len([axis for axis in fig.axes if axis.get_title(loc="left")]) == 9
 
 
 def test_a_figure_says_of_which_track_its_numbers_are(tmp_path, files):

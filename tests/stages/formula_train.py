@@ -63,7 +63,9 @@ class FormulaTrain:
     def n_runs(self):
         return sum(self.batches)
 
-    def __call__(self, config, gains, *, n_threads=1, track_seeds=None, values=None):
+    def __call__(
+        self, config, gains, *, n_threads=1, track_seeds=None, values=None, histories=False
+    ):
         self.batches.append(len(gains))
         gains = gains[:, : len(GAINS)]
         standard = (gains / np.array(config.gains.as_row) - 1) / 0.1

@@ -11,9 +11,21 @@ SWEEPS = [case for case in parameters.cases if parameters.cases[case].sweep]
 CASES = [case for case in parameters.cases if case not in SWEEPS]
 
 
+for case in CASES:
+    refused = [
+        method
+        for method in parameters.cases[case].methods
+        if method not in parameters.cases[case].possible_methods
+    ]
+    if refused:
+        logger.warning(f"cases.{case}: without {', '.join(refused)}: {WHY_NO_DESIGN}")
+    if words := cost_words(parameters, case):
+        logger.warning(f"cases.{case}.random: {words}")
+
+
 def methods_of(case: str, among: tuple[str, ...] = METHODS) -> list[str]:
     """Methods that a case names, of some."""
-    named = parameters.cases[case].methods if case in CASES else ()
+    named = parameters.cases[case].possible_methods if case in CASES else ()
     return [one for one in among if one in named]
 
 
@@ -77,6 +89,8 @@ def chunks(case: str) -> list[dict[str, str]]:
 def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str, str]]:
     """Names of the files of a role that has many."""
     case, every = case_of(wildcards), wildcards.get("scope") == "statistics_truth"
+    if stage.name == "density_in_time":  # barriers are the limits of the best method
+        return [{"method": methods_of(case, DESIGNED)[-1]}]
     if stage.name == "control_study":
         return [
             {"case": one, "method": method} if "method" in by else {"case": one}
@@ -95,7 +109,11 @@ def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str,
         ]
     if stage.name == "sweep":
         return [
-            {"case": one, "method": methods_of(one)[-1]} if "method" in by else {"case": one}
+            (
+                {"case": one, "method": methods_of(one)[-1]}
+                if "method" in by
+                else {"case": one}
+            )
             for one in swept_cases(case)
         ]
     return {

@@ -118,6 +118,11 @@ DRAWN = {
         "what random gains and a random track contribute",
         of_first_split(),
     ),
+    "fig_in_time": (
+        "in_time",
+        "densities over the time of a passage",
+        [file_of("density_in_time", case=case) for case in followed_cases()[:1]],
+    ),
 }
 
 
@@ -172,6 +177,8 @@ for figure, (module, words, files) in DRAWN.items():
 
 # all figures of a case in one job, whichever of them is asked for: most of its time is spent once
 for case in parameters.cases:
+    if not figures_of_case(case):
+        continue
 
     rule:
         name:

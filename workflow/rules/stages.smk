@@ -23,6 +23,7 @@ FILES = {
     "eev": "{case}/{method}/eev.nc",
     "density": "{case}/{method}/density.nc",
     "limits": "{case}/{method}/limits.nc",
+    "density_in_time": "{case}/in_time/density.nc",
     "limit_states": "{case}/{method}/limit_states.nc",
     "mean_run": "{case}/mean_run.nc",
     "sweep": "{case}/sweep.nc",
@@ -39,7 +40,7 @@ FILES = {
 }
 
 # jobs that run passages at the same time
-THREADS = {"dynamic_factor": 2, "tracks": 2}
+THREADS = {"density_in_time": 2, "dynamic_factor": 2, "tracks": 2}
 
 
 for stage in STAGES.values():

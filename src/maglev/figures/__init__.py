@@ -36,6 +36,7 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "track_split": ("track_split",),
     "tracks": ("line",),
     "track_limits": ("line",),
+    "in_time": ("density_in_time",),
 }
 """Every figure with the layouts of the files that it is drawn from, in order.
 

@@ -24,7 +24,7 @@ from maglev import datasets
 from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.fingerprint import code_of
-from maglev.parameters import Config
+from maglev.parameters import WHY_NO_DESIGN, Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import extremes, lost, responses_of
 from maglev.stages.points import case_of, marginals
@@ -121,6 +121,8 @@ class _Design:
         missing = {"initial", *(["candidates"] if method in ADAPTIVE else [])} - set(points)
         if missing:
             raise UserError(f"the method '{method}' needs the points {', '.join(sorted(missing))}")
+        if case_of(config, case).track != "fixed":
+            raise UserError(f"cases.{case}: {method} needs track: fixed: {WHY_NO_DESIGN}")
         self.config, self.case, self.method = config, case, method
         self.points, self.store, self.n_threads = points, Path(store), n_threads
         self.settings = getattr(config.study, method)

@@ -16,6 +16,7 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Literal
 
 import netCDF4
 import numpy as np
@@ -212,6 +213,53 @@ def _compute(
     n_threads: int,
 ) -> Path:
     """Compute some runs and write them as one file of the store."""
+    computed = simulated(config, gains, varied, seeds, n_threads)
+    if seeds is not None:
+        computed["track_seed"] = (("sample",), seeds)
+    if varied:
+        computed["parameter_value"] = (
+            ("sample", "parameter"),
+            np.column_stack(list(varied.values())),
+        )
+        computed = computed.assign_coords(parameter=list(varied))
+    numbers = np.column_stack([gains, *varied.values()])
+    name = hashlib.sha256(b"".join(_row_keys(numbers, seeds))).hexdigest()[:16]
+    path = folder / f"{name}.nc"
+    with _FILES:
+        datasets.write(computed, path, "passage", config=content(config, varied), code=_code())
+    return path
+
+
+def simulated(
+    config: Config,
+    gains: FloatArray,
+    varied: Mapping[str, FloatArray],
+    seeds: IntArray | None,
+    n_threads: int,
+    histories: Literal[False, "responses"] = False,
+) -> xr.Dataset:
+    """Passages by the model at given gains and further quantities; none is looked for in the store.
+
+    Parameters
+    ----------
+    config
+        The configuration, with the guideway of the case.
+    gains : (sample, 4)
+        Gains [A/m, A s/m, A/m, A s/m].
+    varied
+        Further quantities (sample,) by their dotted keys [SI].
+    seeds : (sample,) or None
+        Seed of each sample's irregularity; that of the configuration if not given.
+    n_threads
+        Rows of samples computed at the same time.
+    histories
+        Whether to keep the time series of the responses.
+
+    Raises
+    ------
+    UserError
+        If the time step is too large for some gains, or as `maglev.simulate`.
+    """
     further = [
         varied.get(key, np.full(gains.shape[0], value))
         for key, value in zip(GAIN_COLUMNS[len(GAINS) :], config.gains.further, strict=True)
@@ -223,22 +271,10 @@ def _compute(
         values=others or None,
         track_seeds=seeds,
         n_threads=n_threads,
+        histories=histories,
     )
-    if seeds is not None:
-        computed["track_seed"] = (("sample",), seeds)
-    if varied:
-        computed["parameter_value"] = (
-            ("sample", "parameter"),
-            np.column_stack(list(varied.values())),
-        )
-        computed = computed.assign_coords(parameter=list(varied))
     _refuse_too_large_steps(gains, computed)
-    numbers = np.column_stack([gains, *varied.values()])
-    name = hashlib.sha256(b"".join(_row_keys(numbers, seeds))).hexdigest()[:16]
-    path = folder / f"{name}.nc"
-    with _FILES:
-        datasets.write(computed, path, "passage", config=content(config, varied), code=_code())
-    return path
+    return computed
 
 
 def _plain(config: Config) -> Config:
