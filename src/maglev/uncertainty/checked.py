@@ -22,6 +22,7 @@ from scipy.stats import gamma, norm, t
 
 from maglev.arrays import BoolArray, FloatArray
 from maglev.errors import UserError
+from maglev.uncertainty.exploration import empty_half_space, exploring_points
 from maglev.uncertainty.failure_region import fit_failure_region
 from maglev.uncertainty.kriging import conditioned_kriging, fit_kriging
 from maglev.uncertainty.line_sampling import equivalent_runs
@@ -61,6 +62,10 @@ covariance matrix singular."""
 
 LARGEST_SHARE = 0.3
 """Share of one run in a probability above which nothing is concluded; assumed."""
+
+REFUTED, MOST_REFUTED = 4.0, 0.1
+"""Deviations by which a run refutes the surrogate's doubt, and the share of such runs above which
+nothing is concluded; assumed: the doubt says how much could have been missed."""
 
 N_PLACES = 400
 """Places at which an exceedance is found to invert it; assumed."""
@@ -167,6 +172,9 @@ class Settings:
     ----------
     n_batch
         Runs of a batch.
+    n_exploring
+        How many of them go where no run has been, as long as a half-space as likely as the
+        smallest level is empty.  They train and do not correct.
     n_largest
         Largest number of runs, those of the first design among them.
     n_population
@@ -174,14 +182,15 @@ class Settings:
     """
 
     n_batch: int = 64
+    n_exploring: int = 8
     n_largest: int = 500
     n_population: int = 2**16
 
     def __post_init__(self) -> None:
-        if not (self.n_batch >= 2 and self.n_largest >= 1 and self.n_population >= 100):
+        if not (0 <= self.n_exploring <= self.n_batch - 2 and self.n_population >= 100):
             raise UserError(
-                "a batch must have two runs or more, the largest number be positive and a "
-                f"population have 100 points or more, got {self.n_batch}, {self.n_largest} and "
+                "a batch must have two runs or more beside those that explore, and a population "
+                f"100 points or more, got {self.n_batch}, {self.n_exploring} and "
                 f"{self.n_population}"
             )
 
@@ -199,7 +208,8 @@ class Estimate:
     equivalent_runs
         Runs of crude Monte Carlo with as narrow an interval [-].
     status
-        ``"given"``, or ``"too_few_exceedances"`` where one run carries too much.
+        ``"given"``, or ``"too_few_exceedances"`` where one run carries too much, or the runs
+        refute the surrogate's own doubt.
     """
 
     probability: float
@@ -232,6 +242,8 @@ class Answer:
         Largest weight of one of them [-].
     equivalent_runs : (response, level)
         Runs of crude Monte Carlo that know the probability of each limit as well [-].
+    unvisited
+        Probability of the likeliest half-space without a run [-].
     stopped
         ``"known_as_asked"`` or ``"largest_number_of_runs"``.
     """
@@ -245,6 +257,7 @@ class Answer:
     effective_runs: float
     largest_weight: float
     equivalent_runs: FloatArray
+    unvisited: float
     stopped: str
 
 
@@ -255,13 +268,15 @@ class Plan:
     Parameters
     ----------
     points : (run, parameter)
-        Points to run, all different [-].
+        Points that were drawn, all different [-].
+    exploring : (exploring run, parameter)
+        Points to run beside them, which count nothing [-].
     repeats : (run,)
         How often each was drawn.
     weight : (run,)
         Density of the law over that of the draw [-].
-    predicted : (run, response)
-        The surrogate's values there [unit].
+    predicted, deviation : (run, response)
+        The surrogate's values there, and their deviations [unit].
     predicted_lost : (run,) of bool
         Whether the surrogate takes them for lost.
     population : (point, response)
@@ -278,15 +293,22 @@ class Plan:
     """
 
     points: FloatArray
+    exploring: FloatArray
     repeats: FloatArray
     weight: FloatArray
     predicted: FloatArray
+    deviation: FloatArray
     predicted_lost: BoolArray
     population: FloatArray
     population_lost: BoolArray
     population_weight: FloatArray
     missed: FloatArray
     trust: float
+
+    @property
+    def to_run(self) -> FloatArray:
+        """All points (run + exploring run, parameter) of the batch, in this order."""
+        return np.concatenate([self.points, self.exploring])
 
     @property
     def n_draws(self) -> float:
@@ -355,29 +377,24 @@ def checked(
     plans: list[Plan] = []
     outcomes: list[Runs] = []
     sofar, answer = first, None
+    unvisited = _unvisited(first, seed)
     for number in range(settings.n_largest):
         rng = np.random.default_rng([seed, number])
-        left = settings.n_largest - sofar.lost.size
-        if left < 2:
+        n_new = min(settings.n_batch, settings.n_largest - sofar.lost.size)
+        if n_new < settings.n_exploring + 2:
             break
-        proxy = fit(sofar, rng)
+        n_exploring = settings.n_exploring if unvisited > min(asked.levels) else 0
         need = None if answer is None else _needs(answer, asked, sofar)
-        plan = planned(proxy, sofar, asked, min(settings.n_batch, left), settings, rng, need)
-        if number < len(batches):
-            outcome = batches[number]
-            if not np.array_equal(outcome.points, plan.points):
-                raise UserError(
-                    f"stored batch {number} was drawn at other points than are due; use the seed, "
-                    "the first design and the settings it was made with"
-                )
-        else:
-            values, lost = run(plan.points)
-            outcome = Runs(points=plan.points, values=values, lost=lost)
+        plan = planned(
+            fit(sofar, rng), sofar, asked, n_new - n_exploring, settings, rng, need, n_exploring
+        )
+        outcome = _stored(batches[number], plan) if number < len(batches) else _run(run, plan)
         plans.append(plan)
         outcomes.append(outcome)
         sofar = sofar.and_of(outcome)
-        answer = counted(plans, outcomes, asked, sofar.lost.size)
-        if _known(answer, asked, sofar):
+        unvisited = _unvisited(sofar, seed)
+        answer = replace(counted(plans, outcomes, asked, sofar.lost.size), unvisited=unvisited)
+        if unvisited <= min(asked.levels) and _known(answer, asked, sofar):
             return replace(answer, stopped="known_as_asked")
     if answer is None:
         raise UserError(
@@ -385,6 +402,27 @@ def checked(
             f"{settings.n_largest} are allowed in all; allow more"
         )
     return answer
+
+
+def _run(run: Run, plan: Plan) -> Runs:
+    """Outcomes of a batch."""
+    values, lost = run(plan.to_run)
+    return Runs(points=plan.to_run, values=values, lost=lost)
+
+
+def _stored(outcome: Runs, plan: Plan) -> Runs:
+    """A stored batch, if it is the one that is due."""
+    if not np.array_equal(outcome.points, plan.to_run):
+        raise UserError(
+            "a stored batch was drawn at other points than are due; use the seed, the first "
+            "design and the settings it was made with"
+        )
+    return outcome
+
+
+def _unvisited(runs: Runs, seed: int) -> float:
+    """Probability of the likeliest half-space without a run."""
+    return empty_half_space(runs.points, np.random.default_rng(seed)).probability
 
 
 def kriging_proxy(runs: Runs, rng: np.random.Generator) -> Proxy:
@@ -469,6 +507,7 @@ def planned(
     settings: Settings,
     rng: np.random.Generator,
     need: FloatArray | None = None,
+    n_exploring: int = 0,
 ) -> Plan:
     """Draw the points of a batch where the surrogate may be wrong.
 
@@ -488,6 +527,8 @@ def planned(
         Source of population and draws.
     need : (target,), optional
         Shares of the targets [-]; equal if not given.
+    n_exploring
+        Points beside the draws, where no run has been.
 
     Returns
     -------
@@ -537,9 +578,11 @@ def planned(
     )
     return Plan(
         points=points[drawn],
+        exploring=_exploring(sofar, points[drawn], n_exploring, min(asked.levels), rng),
         repeats=repeats.astype(float),
         weight=of_draw[drawn],
         predicted=seen.values[drawn],
+        deviation=seen.deviation[drawn],
         predicted_lost=seen.lost[drawn],
         population=seen.values,
         population_lost=seen.lost,
@@ -549,9 +592,17 @@ def planned(
     )
 
 
-def counted(
-    plans: Sequence[Plan], outcomes: Sequence[Runs], asked: Asked, n_runs: int
-) -> Answer:
+def _exploring(
+    sofar: Runs, drawn: FloatArray, n_new: int, level: float, rng: np.random.Generator
+) -> FloatArray:
+    """Points (exploring run, parameter) where neither a run nor a draw has been."""
+    if n_new == 0:
+        return np.empty((0, drawn.shape[1]))
+    known = np.concatenate([sofar.points, drawn])
+    return exploring_points(known, n_new, float(norm.isf(level)), rng)
+
+
+def counted(plans: Sequence[Plan], outcomes: Sequence[Runs], asked: Asked, n_runs: int) -> Answer:
     """What batches and their outcomes say.
 
     Parameters
@@ -566,7 +617,8 @@ def counted(
     Returns
     -------
     answer
-        Limits and probabilities, as if the largest number of runs had been reached.
+        Limits and probabilities, as if the largest number of runs had been reached and nothing
+        were known of the unvisited.
 
     References
     ----------
@@ -574,10 +626,10 @@ def counted(
     27 (2008) 1693-1702 (interval of a sum); docs/theory/checked.md, eqs. (4) to (8).
     """
     tally = _Tally(plans, outcomes, asked.confidence)
-    lost = tally.estimate(lambda values, lost: lost, -1)
+    lost = tally.estimate(lambda values, lost: lost, -1, False)
     n_levels, n_responses = len(asked.levels), plans[0].predicted.shape[1]
     states = {
-        name: tally.estimate(state, n_responses * n_levels + k)
+        name: tally.estimate(state, n_responses * n_levels + k, bool(tally.refuted.any()))
         for k, (name, state) in enumerate(asked.states.items())
     }
     found = [
@@ -595,6 +647,7 @@ def counted(
         effective_runs=effective_size(law / law.sum()),
         largest_weight=float(tally.weight.max()),
         equivalent_runs=np.array([equal for _, equal in found[0]]),
+        unvisited=1.0,
         stopped="largest_number_of_runs",
     )
 
@@ -609,7 +662,8 @@ def weighted_count_interval(
     total, squares : (...)
         Sum of the weights of the events seen, and of their squares [-].
     missed : (...)
-        Weight of an event that was not seen, which keeps the upper end from zero [-].
+        Weight of an event that was not seen, not below the largest seen [-]; it keeps the upper
+        end from zero.
     confidence
         Two-sided confidence [-].
 
@@ -720,9 +774,7 @@ class _Seen:
 class _Tally:
     """All batches together, ready to be counted."""
 
-    def __init__(
-        self, plans: Sequence[Plan], outcomes: Sequence[Runs], confidence: float
-    ) -> None:
+    def __init__(self, plans: Sequence[Plan], outcomes: Sequence[Runs], confidence: float) -> None:
         self.plans, self.confidence = plans, confidence
         trust = np.array([plan.n_draws * plan.trust for plan in plans])
         self.share = trust / trust.sum()
@@ -736,8 +788,15 @@ class _Tally:
         )
         self.predicted = np.concatenate([plan.predicted for plan in plans])
         self.predicted_lost = np.concatenate([plan.predicted_lost for plan in plans])
-        self.values = np.concatenate([one.values for one in outcomes])
-        self.lost = np.concatenate([one.lost for one in outcomes])
+        drawn = [
+            (one.values[: len(plan.points)], one.lost[: len(plan.points)])
+            for one, plan in zip(outcomes, plans, strict=True)
+        ]
+        self.values, self.lost = (np.concatenate(column) for column in zip(*drawn, strict=True))
+        deviation = np.concatenate([plan.deviation for plan in plans])
+        off = np.abs(self.values - self.predicted) > REFUTED * deviation
+        counts = self.part / np.where(self.weight > 0.0, self.weight, 1.0) * ~self.lost
+        self.refuted = counts @ off / max(counts.sum(), 1e-300) > MOST_REFUTED
 
     def missed(self, target: int) -> float:
         """Mean part of a run that would show the surrogate wrong on a target."""
@@ -747,8 +806,8 @@ class _Tally:
         ]
         return float(np.sum(of_batch))
 
-    def estimate(self, state: State, target: int) -> Estimate:
-        """Probability of a limit state."""
+    def estimate(self, state: State, target: int, refuted: bool) -> Estimate:
+        """Probability of a limit state; nothing is concluded if its surrogate is refuted."""
         base, variance = 0.0, 0.0
         for share, plan in zip(self.share, self.plans, strict=True):
             lost = plan.population_lost
@@ -771,7 +830,7 @@ class _Tally:
             upper=upper,
             largest_share=largest,
             equivalent_runs=equivalent_runs(probability, 0.5 * (upper - lower), self.confidence),
-            status=GIVEN if largest <= LARGEST_SHARE else TOO_FEW,
+            status=TOO_FEW if largest > LARGEST_SHARE or refuted else GIVEN,
         )
 
     def limits(
@@ -804,11 +863,13 @@ class _Tally:
             )
             near = int(np.clip(np.searchsorted(places, limit[k]), 0, places.size - 1))
             share[k] = largest[near] * probability[near] / wanted[k]
-            equal[k] = equivalent_runs(
-                wanted[k], 0.5 * (high[near] - low[near]), self.confidence
-            )
+            equal[k] = equivalent_runs(wanted[k], 0.5 * (high[near] - low[near]), self.confidence)
         status = tuple(
-            INFINITE if np.isinf(y) else GIVEN if one <= LARGEST_SHARE else TOO_FEW
+            INFINITE
+            if np.isinf(y)
+            else TOO_FEW
+            if one > LARGEST_SHARE or self.refuted[response]
+            else GIVEN
             for y, one in zip(limit, share, strict=True)
         )
         given = np.array(status) == GIVEN
@@ -833,14 +894,8 @@ class _Tally:
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Estimate, ends and largest share (event,) of events (run, event)."""
         more, less = truly & ~thought, thought & ~truly
-        squares = self.part**2
-        plus, minus = self.part @ more, self.part @ less
-        low_plus, high_plus = weighted_count_interval(
-            plus, squares @ more, missed, self.confidence
-        )
-        low_minus, high_minus = weighted_count_interval(
-            minus, squares @ less, missed, self.confidence
-        )
+        plus, low_plus, high_plus = self._counted(more, missed)
+        minus, low_minus, high_minus = self._counted(less, missed)
         z = norm.ppf(0.5 + 0.5 * self.confidence)
         high_minus = np.minimum(high_minus, np.maximum(base, minus))
         estimate = np.maximum(base + plus - minus, 0.0)
@@ -850,6 +905,14 @@ class _Tally:
         largest = np.max(self.part[:, None] * (more | less), axis=0, initial=0.0)
         share = largest / np.where(estimate > 0.0, estimate, np.where(largest > 0.0, largest, 1.0))
         return estimate, lower, np.minimum(estimate + up, 1.0), share
+
+    def _counted(
+        self, events: BoolArray, missed: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Sum of the parts of events (run, event), and ends of its interval."""
+        total, squares = self.part @ events, self.part**2 @ events
+        largest = np.max(self.part[:, None] * events, axis=0, initial=missed)
+        return total, *weighted_count_interval(total, squares, largest, self.confidence)
 
 
 def _log_widths(points: FloatArray, shares: FloatArray) -> FloatArray:
@@ -881,9 +944,7 @@ def _population(
     return points, 1.0 / ratio
 
 
-def _limits_of(
-    values: FloatArray, weight: FloatArray, levels: tuple[float, ...]
-) -> FloatArray:
+def _limits_of(values: FloatArray, weight: FloatArray, levels: tuple[float, ...]) -> FloatArray:
     """Limits (level,) of weighted values, the largest finite one where there is none."""
     order = np.argsort(-values)
     beyond = np.cumsum(weight[order]) / weight.sum()
@@ -902,9 +963,7 @@ def _sorted(values: FloatArray, plan: Plan) -> tuple[FloatArray, FloatArray, Flo
     """Values of a population in order, and mean weight and its square beyond each of them."""
     order = np.argsort(values)
     weight, n = plan.population_weight[order], values.size
-    mass, square = (
-        np.append(np.cumsum(one[::-1])[::-1], 0.0) / n for one in (weight, weight**2)
-    )
+    mass, square = (np.append(np.cumsum(one[::-1])[::-1], 0.0) / n for one in (weight, weight**2))
     return values[order], mass, square, n
 
 

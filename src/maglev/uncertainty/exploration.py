@@ -103,7 +103,9 @@ def empty_half_space(points: npt.ArrayLike, rng: np.random.Generator) -> EmptyHa
         raise UserError("an empty half-space needs runs to be empty of, got none; give one or more")
     if s == 1:
         ends = np.array([points.max(), -points.min()])
-        return EmptyHalfSpace(direction=np.array([[1.0], [-1.0]])[ends.argmin()], distance=ends.min())
+        return EmptyHalfSpace(
+            direction=np.array([[1.0], [-1.0]])[ends.argmin()], distance=ends.min()
+        )
     if s <= MOST_HULL_INPUTS and n > s:
         try:
             facets = ConvexHull(points).equations
@@ -111,9 +113,7 @@ def empty_half_space(points: npt.ArrayLike, rng: np.random.Generator) -> EmptyHa
             pass  # all in one plane: no facets, yet directions serve
         else:
             worst = int(np.argmin(-facets[:, -1]))
-            return EmptyHalfSpace(
-                direction=facets[worst, :-1], distance=float(-facets[worst, -1])
-            )
+            return EmptyHalfSpace(direction=facets[worst, :-1], distance=float(-facets[worst, -1]))
     directions = unit(rng.standard_normal((N_DIRECTIONS, s)))
     support = (directions @ points.T).max(axis=1)
     found = _descended(directions[np.argsort(support)[:N_DESCENTS]], points)
@@ -182,7 +182,9 @@ def exploring_points(
     return new
 
 
-def surrounding_directions(n_inputs: int, rng: np.random.Generator, n_random: int = 64) -> FloatArray:
+def surrounding_directions(
+    n_inputs: int, rng: np.random.Generator, n_random: int = 64
+) -> FloatArray:
     """Unit directions that surround the mean: axes and corners, for many inputs random pairs.
 
     Four inputs have the 24-cell, whose hull holds a ball of radius 1/√2.
@@ -326,9 +328,7 @@ def may_settle(
     return bool(last.size == n_rounds and (last <= threshold).all() and unvisited <= level)
 
 
-def with_unvisited(
-    lost_interval: tuple[float, float], unvisited: float
-) -> tuple[float, float]:
+def with_unvisited(lost_interval: tuple[float, float], unvisited: float) -> tuple[float, float]:
     """Interval of the probability of loss that allows all that was not visited to be lost.
 
     Given to `maglev.uncertainty.reliability.surrogate_limits` as ``lost_interval``, it leaves a

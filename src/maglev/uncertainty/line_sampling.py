@@ -337,7 +337,9 @@ def _scouted(search: _Search) -> list[_Crossings]:
         )
     away = search.run(np.concatenate([np.zeros((1, search.n_inputs)), search.reach * scouts]))
     if away[0]:
-        raise UserError("a run at the mean of the inputs must be held to search from, got a lost one")
+        raise UserError(
+            "a run at the mean of the inputs must be held to search from, got a lost one"
+        )
     met = scouts[away[1:]]
     while not len(met) and search.n_runs < search.n_largest // 2:
         more = exploring_points(np.concatenate(search.seen), N_BATCH, 1.0, search.rng)
@@ -499,7 +501,13 @@ def _with_lines(
     weight = search.weight[drawn] / (chance[drawn] * len(chance))
     before = search.n_runs
     low, high = _bracketed(
-        search, region.direction, foot, first, guess, max(border.deviation, 0.5 * tolerance), tolerance
+        search,
+        region.direction,
+        foot,
+        first,
+        guess,
+        max(border.deviation, 0.5 * tolerance),
+        tolerance,
     )
     search.runs_per_line = max((search.n_runs - before) / n_lines, 2.0)
     return Region(
@@ -674,9 +682,7 @@ def _half_width(regions: list[Region], error: FloatArray, confidence: float) -> 
     return float(np.linalg.norm(t.ppf(0.5 + 0.5 * confidence, lines - 1) * CAUTION * error))
 
 
-def _check(
-    n_inputs: int, n_largest: int, asked: float, reach: float, confidence: float
-) -> None:
+def _check(n_inputs: int, n_largest: int, asked: float, reach: float, confidence: float) -> None:
     if n_inputs < 2 or n_largest < 1 or not asked > 0.0 or not reach > 0.0:
         raise UserError(
             "lines need at least two inputs, one run, and a positive half width and reach, got "
