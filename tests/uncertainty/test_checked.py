@@ -193,7 +193,7 @@ def test_the_stray_tail_is_met_before_anything_is_known():
 
 def test_close_runs_do_not_train_twice():
     points = np.array([[0.0, 0.0], [0.01, 0.0], [0.5, 0.0], [0.5, 0.01]])
-    kept, values = thinned(points, np.arange(4.0)[:, None])
+    _, values = thinned(points, np.arange(4.0)[:, None])
     assert_array_equal(values[:, 0], [0.0, 2.0])
 
 

@@ -24,7 +24,7 @@ def test_the_ball_within_a_cube_and_a_cross():
     assert_allclose(empty_half_space(axes, rng).distance, 1.5)  # 3/√4
     assert_allclose(empty_half_space(axes[:, :1], rng).distance, 3.0)
     assert_allclose(empty_half_space(4.0 * surrounding_directions(4, rng), rng).distance, 8**0.5)
-    beside = empty_half_space(axes + [10.0, 0.0, 0.0, 0.0], rng)
+    beside = empty_half_space(axes + np.array([10.0, 0.0, 0.0, 0.0]), rng)
     assert beside.distance < 0.0 and beside.probability > 0.5
 
 

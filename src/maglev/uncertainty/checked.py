@@ -32,7 +32,7 @@ from maglev.vocabulary import GIVEN, INFINITE, TOO_FEW
 
 WIDTHS = (1.0, 1.5, 2.0)
 """Deviations of the normal laws that a population is drawn from [-]; the first is the law itself.
-Assumed: twice the deviation reaches what has a probability of 1e-6 as often as once in a hundred."""
+Assumed: twice the deviation reaches what has a probability of 1e-6 once in a hundred draws."""
 
 LAW_SHARE, WIDE_SHARE = 0.3, 0.2
 """Shares of the law and of the wider ones in a population; the rest lies around the surrogate's
@@ -552,17 +552,8 @@ def planned(
     >>> bool(1.0 / plan.weight.min() > 20.0)  # near the limit, 20 times as often as under the law
     True
     """
-    n, s = settings.n_population, sofar.points.shape[1]
-    pilot = np.concatenate([w * rng.standard_normal((n // len(WIDTHS), s)) for w in WIDTHS])
-    of_pilot = _Seen.at(proxy, pilot, np.exp(-_log_widths(pilot, np.full(3, 1 / 3))), asked, rng)
-    centres = np.concatenate(
-        [
-            pilot[rng.choice(len(pilot), N_CENTRES, p=chance / chance.sum())]
-            for chance in np.sqrt(of_pilot.weight) * of_pilot.tails()
-            if chance.sum() > 0.0
-        ]
-    )
-    points, weight = _population(n, centres, rng)
+    n = settings.n_population
+    points, weight = tail_population(proxy, n, sofar.points.shape[1], asked, rng)
     seen = _Seen.at(proxy, points, weight, asked, rng)
     doubts = seen.doubts()
     shares = np.sqrt(doubts) * weight
@@ -600,6 +591,58 @@ def _exploring(
         return np.empty((0, drawn.shape[1]))
     known = np.concatenate([sofar.points, drawn])
     return exploring_points(known, n_new, float(norm.isf(level)), rng)
+
+
+def tail_population(
+    proxy: Proxy, n: int, n_inputs: int, asked: Asked, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Weighted points of which many lie in the tails that are asked for.
+
+    Parameters
+    ----------
+    proxy
+        The surrogate that says where the tails are.
+    n
+        Number of points.
+    n_inputs
+        Number of inputs.
+    asked
+        Levels and limit states.
+    rng
+        Source of the points.
+
+    Returns
+    -------
+    points : (n, n_inputs)
+        Standard normal points [-].
+    weight : (n,)
+        Density of the law over theirs [-], at most 1/0.3.
+
+    Examples
+    --------
+    >>> proxy = Proxy(
+    ...     predict=lambda points: points[:, :1],
+    ...     deviation=lambda points: np.full((len(points), 1), 0.1),
+    ...     lost_probability=lambda points: np.zeros(len(points)),
+    ... )
+    >>> rng = np.random.default_rng(0)
+    >>> points, weight = tail_population(proxy, 10000, 2, Asked(levels=(1e-5,)), rng)
+    >>> bool(abs(1e5 * np.mean(weight * (points[:, 0] > 4.265)) - 1.0) < 0.2)
+    True
+    """
+    pilot = np.concatenate(
+        [width * rng.standard_normal((n // len(WIDTHS), n_inputs)) for width in WIDTHS]
+    )
+    equal = np.full(len(WIDTHS), 1.0 / len(WIDTHS))
+    seen = _Seen.at(proxy, pilot, np.exp(-_log_widths(pilot, equal)), asked, rng)
+    centres = np.concatenate(
+        [
+            pilot[rng.choice(len(pilot), N_CENTRES, p=chance / chance.sum())]
+            for chance in np.sqrt(seen.weight) * seen.tails()
+            if chance.sum() > 0.0
+        ]
+    )
+    return _population(n, centres, rng)
 
 
 def counted(plans: Sequence[Plan], outcomes: Sequence[Runs], asked: Asked, n_runs: int) -> Answer:

@@ -273,15 +273,15 @@ def unvisited_probability(
     """
     points = checked_points(points)
     population = checked_points(population, points.shape[1])
-    length = np.minimum(np.broadcast_to(np.asarray(length, float), points.shape[1:]), 1.0)
-    if not ((length > 0.0).all() and reach > 0.0):
-        raise UserError(f"lengths and reach must be positive, got {length} and {reach}")
+    axes = np.minimum(np.broadcast_to(np.asarray(length, float), points.shape[1:]), 1.0)
+    if not ((axes > 0.0).all() and reach > 0.0):
+        raise UserError(f"lengths and reach must be positive, got {axes} and {reach}")
     share = np.ones(population.shape[0]) if weight is None else np.asarray(weight, float)
     if share.shape != population.shape[:1]:
         raise UserError(
             f"weights have shape {share.shape}, expected (point,) = {population.shape[:1]}"
         )
-    distance = cKDTree(points / length).query(population / length)[0]
+    distance = cKDTree(points / axes).query(population / axes)[0]
     return float(share[distance > reach].sum() / share.sum())
 
 
