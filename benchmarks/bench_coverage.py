@@ -251,7 +251,7 @@ def page(n_seeds: int) -> str:
         "Limits of functions with known answers by 104 runs, and by 196 more that check them.",
         "Each cell: intervals that hold the limit, of those given; median half width (and median",
         "error), over the deviation of the response.  95 % is stated.  ∞: most intervals have no",
-        "upper end, as what no run has visited is likelier than the level.  A limit that is not given",
+        "upper end, as what no run has visited is likelier than the level.  A limit not given",
         "is one of which the method says that it cannot conclude.  –: losses are likelier.",
         "",
     ]

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import norm
 
 from maglev.errors import UserError
+from maglev.uncertainty import line_sampling
 from maglev.uncertainty.line_sampling import equivalent_runs, lost_by_lines
 
 TURN = np.linalg.qr(np.random.default_rng(4).standard_normal((4, 4)))[0]
@@ -77,10 +78,31 @@ def test_a_bent_border_is_known_as_well():
 
 
 def test_lines_are_unbiased_although_they_share_a_fitted_border():
-    exact = norm.sf(4.75)
-    errors = [found(lambda v: v[:, 0] > 4.75, seed).probability / exact - 1.0 for seed in range(24)]
-    assert abs(np.mean(errors)) < 3.0 * np.std(errors) / np.sqrt(24)
-    assert abs(np.mean(errors)) < 0.008
+    """A crossing lies anywhere in its bracket, also where the guess of all lines is off."""
+    exact, normal = norm.sf(4.75), TURN[0]
+    errors, places = [], []
+    for seed in range(16):
+        estimate = found(lambda v: v[:, 0] > 4.75, seed)
+        (region,) = estimate.regions
+        crossing = (4.75 - region.foot @ normal) / (region.direction @ normal)
+        places.append((crossing - region.low) / (region.high - region.low))
+        errors.append(estimate.probability / exact - 1.0)
+    place = np.concatenate(places)
+    assert (place >= 0.0).all() and (place <= 1.0).all()
+    assert abs(place.mean() - 0.5) < 3.0 * np.sqrt(1.0 / 12.0 / place.size)
+    assert abs(np.mean(errors)) < 0.01
+
+
+def test_lines_that_share_a_wrong_guess_do_not_agree_on_it():
+    rng = np.random.default_rng(0)
+    search = line_sampling._Search(lambda u: u[:, 0] > 1.004, 2, rng, 10_000, 7.0)
+    foot, guess = np.zeros((400, 2)), np.full(400, 1.0)
+    nowhere = np.full(400, -np.inf)
+    low, high = line_sampling._bracketed(
+        search, np.array([1.0, 0.0]), foot, nowhere, guess, 0.015, 0.03
+    )
+    assert (low <= 1.004).all() and (high > 1.004).all() and (high - low <= 0.0301).all()
+    assert abs(np.mean(0.5 * (low + high)) - 1.004) < 3.0 * 0.03 / np.sqrt(12.0 * 400)
 
 
 def test_without_a_lost_run_the_unvisited_half_space_is_the_upper_end():

@@ -20,7 +20,7 @@ from maglev.uncertainty.samples import weighted_quantile
 from maglev.uncertainty.surrogate import checked_points
 from maglev.vocabulary import GIVEN, INFINITE, TOO_FEW
 
-N_NODES = 200
+N_NODES = 800
 """Points that stand for those that share the value of a limit; assumed."""
 
 BAND = 0.1
@@ -141,8 +141,8 @@ def joint_limits(
     lost_interval
         Ends of the interval of the probability of loss [-].
     unvisited
-        Probability that no run has visited [-], all of which may exceed: a limit at a rarer level
-        has no upper end.
+        Probability that no run has visited [-]: a limit at a rarer level has no upper end, as all
+        of it may exceed.  To count it below that as well, widen ``lost_interval`` by it.
     confidence
         Two-sided confidence [-].
 
@@ -200,9 +200,10 @@ def joint_limits(
             confidence=confidence,
         )
     more = levels + (away - lost_interval[0]) + z * noise
-    less = levels + (away - lost_interval[1]) - z * noise - unvisited
+    less = levels + (away - lost_interval[1]) - z * noise
     lower = weighted_quantile(beyond, share, more) + low
-    upper = np.where(less > away, weighted_quantile(beyond, share, less) + high, np.inf)
+    bounded = (less > away) & (unvisited <= levels)
+    upper = np.where(bounded, weighted_quantile(beyond, share, less) + high, np.inf)
     given = finite & (effective >= CARRIED)
     return Limits(
         failure_probability=levels,
