@@ -50,6 +50,7 @@ def design(run, n, n_inputs, seed):
     return runs_at(run, 1.5 * np.random.default_rng(seed).standard_normal((n, n_inputs)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("proxy", "refuted"),
     [
@@ -94,6 +95,7 @@ def test_weights_are_those_of_the_law_and_bounded():
     assert plan.weight.max() <= 10.5  # half the defence is drawn from the law
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["smooth", "kinked", "cliff", "jump"])
 def test_intervals_hold_the_limits_of_known_functions(name):
     known, levels = KNOWN[name], (1e-2, 1e-3)
@@ -179,6 +181,7 @@ def test_a_stored_batch_gives_the_same_numbers_and_another_one_is_refused():
         checked(run, kriging_proxy, before, asked, SMALL, 10, made[:1])
 
 
+@pytest.mark.slow
 def test_the_stray_tail_is_met_before_anything_is_known():
     stray = KNOWN["stray"]
     (exact,), sigma = stray.limits([1e-3])

@@ -89,6 +89,7 @@ def test_weights_stand_for_the_law(process):
     assert ranges[1] / ranges[0] > 2.5  # without weights it is another law
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["smooth", "kinked", "jump"])
 def test_intervals_hold_the_limits_of_known_functions(name):
     """A small version of docs/benchmarks/coverage.md."""

@@ -38,6 +38,7 @@ def test_half_spaces_down_to_1e_8_are_known_within_5_percent_by_200_runs(distanc
     assert inside >= 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lost", "exact"),
     [
@@ -67,6 +68,7 @@ def test_overlapping_regions_are_not_counted_twice():
         assert abs(estimate.probability / exact - 1.0) < 0.05
 
 
+@pytest.mark.slow
 def test_a_bent_border_is_known_as_well():
     x = np.arange(-9.0, 9.0, 0.001)
     exact = np.sum(norm.pdf(x) * norm.sf(4.7 - 0.08 * x**2)) * 0.001
@@ -77,6 +79,7 @@ def test_a_bent_border_is_known_as_well():
     assert np.median(errors) < 0.04 and max(errors) < 0.15
 
 
+@pytest.mark.slow
 def test_lines_are_unbiased_although_they_share_a_fitted_border():
     """A crossing lies anywhere in its bracket, also where the guess of all lines is off."""
     exact, normal = norm.sf(4.75), TURN[0]
