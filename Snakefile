@@ -3,29 +3,33 @@ import re
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
 from snakemake.utils import min_version, validate
 
 from maglev.config import (
     ConfigError,
     config_text,
     from_mapping,
-    overlay,
-    read_overlays,
-    rebase,
+    layered,
 )
 from maglev.fingerprint import code_of
+from maglev.parameters import WHY_NO_DESIGN
 from maglev.stage import flag, stages, summaries
+from maglev.stages.paper_and_ours import RESPONSE
 from maglev.stages.points import n_samples
 from maglev.vocabulary import BASELINE, DESIGNED, METHODS, TRACK_PARTS
 
 min_version("9.0")
 
-# What was given with --configfile lies over config/config.yaml, or over the file that it extends;
-# names of files in it are relative to config/.
+# Files given with --configfile lie over config/config.yaml, or over what they extend; names of files
+# count from the file that names them.  Snakemake's own reading keeps neither.
 try:
-    given = rebase(config, old="config", new=".")
-    base = Path("config", given.pop("extends", "config.yaml"))
-    parameters = from_mapping(overlay(read_overlays(base), given))
+    given = layered(
+        workflow.overwrite_configfiles,
+        dict(workflow.config_settings.config),
+        "config/config.yaml",
+    )
+    parameters = from_mapping(given)
 except ConfigError as error:
     raise WorkflowError(str(error)) from None
 STAGES, SUMMARIES = stages(), summaries()
@@ -63,8 +67,8 @@ rule all:
 rule truth:
     input:
         [
-            place(stage, case=case, method=BASELINE)
+            file_of(stage, case=case, method=BASELINE)
             for stage in ("baseline", "density", "limits")
-            for case in parameters.cases
+            for case in CASES
         ],
-        place("statistics_check", scope="statistics_truth"),
+        file_of("statistics_check", scope="statistics_truth"),

@@ -244,17 +244,20 @@ def rail_under_train(system: integrate.System) -> Array:
 def poles_and_coefficients(system: integrate.System) -> tuple[int, float]:
     """Poles of the train, and the rail coefficients under all their faces in a mean step [-]."""
     poles, met = 0, 0
-    for places in (system.suspension_places, system.guidance_places):
+    for footprints in (system.suspension_footprints, system.guidance_footprints):
         n = course(system.config).n_steps
-        poles += 2 * places.number.size  # right and left
-        # places follow each other, and so do their coefficients
+        poles += 2 * footprints.number.size  # right and left
+        # footprints follow each other, and so do their coefficients
         met += 2 * int(
-            (places.start[places.number + n + 1] - places.start[places.number + 1]).sum()
+            (
+                footprints.start[footprints.number + n + 1]
+                - footprints.start[footprints.number + 1]
+            ).sum()
         )
     return poles, met / course(system.config).n_steps
 
 
-def steps_of_stages(system: integrate.System) -> Array:
+def steps_of_stretches(system: integrate.System) -> Array:
     """Steps that each stretch of the guideway lasts (stretch,) [-]."""
     begins = system.spans.stretches.first_step
     return np.diff([*begins, course(system.config).n_steps + 1])
@@ -263,7 +266,7 @@ def steps_of_stages(system: integrate.System) -> Array:
 def operations(system: integrate.System) -> dict[str, float]:
     """Operations of a mean step of one sample in each phase, from the sizes of its arrays."""
     vehicle, spans = system.vehicle, system.spans
-    steps = steps_of_stages(system)
+    steps = steps_of_stretches(system)
     n_dof = vehicle.inverse_mass.size
     # links: what they hang on 3, fused; stretch 2m - 1 and force back 2m for m coefficients
     links = 3 * vehicle.scaled_dof.size + 4 * vehicle.link_coefficient.size
@@ -308,7 +311,7 @@ def operations(system: integrate.System) -> dict[str, float]:
     # states: x 2, velocity 2, predicted 4, fused; the train's forces over its masses 1
     states = 9 * n_dof * moving + line_states
     # outputs: midspan z and y 4 a column, each section of the low-pass 9, peak of a response 9
-    n_sections = packing.run(system.config, 0).sections.shape[0]
+    n_sections = packing.timing(system.config, 0).sections.shape[0]
     outputs = 2 * (4 * spans.output_column.size + 9 * n_sections)
     outputs += 9 * (4 + 2 * vehicle.body_z.size)
     return {
@@ -357,12 +360,12 @@ def _repeat_rails(n, spans, span, guideway, rails, turn, packed):
 
 @njit
 def _every_step(
-    stride, first, last, places, rows, law, dt, gains, train, rails, magnet, circuits, watch,
+    stride, first, last, footprints, rows, law, dt, gains, train, rails, magnet, circuits, watch,
     outcome,
 ):  # fmt: skip
     for step in range(first, last + 1, stride):
         attract(
-            places, rows, law, step, dt, gains, train, rails, magnet, circuits, False, watch,
+            footprints, rows, law, step, dt, gains, train, rails, magnet, circuits, False, watch,
             outcome,
         )  # fmt: skip
 
@@ -394,11 +397,11 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     guideway, guideway_resting = motion(n_line, 1e-5), at_rest(n_line)
     rails = Rails(*(rows(3 * n_rail, 1e-5).reshape((3, n_rail, LANES)) for _ in range(3)))
     turn, packed = zeros(spans.stride), zeros(spans.upright.size + spans.sideways.size)
-    run = packing.run(system.config, 0)
+    timing = packing.timing(system.config, 0)
     kinds = (system.suspension, system.guidance)
-    outcome = packing.empty_outcome(system.train, kinds, run)
+    outcome = packing.empty_outcome(system.train, kinds, timing)
     n_responses = outcome.extreme.shape[0]
-    watch = _new_watch(system.train.magnets.x.size, run.sections.shape[0], n_responses)
+    watch = _new_watch(system.train.magnets.x.size, timing.sections.shape[0], n_responses)
     gains = np.concatenate([gains_of(system.config, LANES), np.zeros((LANES, 4))], axis=1)
     lanes = np.ascontiguousarray(gains.T)
 
@@ -406,11 +409,11 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
         function(1)  # compiles
         return timed(lambda: function(n), 3).process / n / LANES
 
-    moving = 1 - (run.first_step - 1) / run.n_steps
+    moving = 1 - (timing.first_step - 1) / timing.n_steps
     links = moving * per_call(2000, lambda n: _repeat_links(n, vehicle, train, scaled, link_pull))
     states = moving * per_call(2000, lambda n: _repeat_train(n, vehicle, dt, resting))
     stepped = 0.0
-    for stretch, share in enumerate(steps_of_stages(system) / run.n_steps):
+    for stretch, share in enumerate(steps_of_stretches(system) / timing.n_steps):
         stepped += share * per_call(
             500, lambda n, at=stretch: _repeat_answer(n, spans, at, guideway)
         )
@@ -429,9 +432,9 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     every = 20  # of all steps, evenly over the passage
     poles = 0.0
     train, rails = motion(n_dof, 1e-5), Rails(*(0.0 * field for field in rails))
-    for kind, places, circuit in zip(
+    for kind, footprints, circuit in zip(
         kinds,
-        (system.suspension_places, system.guidance_places),
+        (system.suspension_footprints, system.guidance_footprints),
         (system.config.control.suspension, system.config.control.guidance),
         strict=True,
     ):
@@ -439,15 +442,15 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
         magnet, circuits = empty_magnet(kind, law), circuits_at_rest(kind, law)
 
         def calls(
-            n: int, kind=kind, places=places, law=law, magnet=magnet, circuits=circuits
+            n: int, kind=kind, footprints=footprints, law=law, magnet=magnet, circuits=circuits
         ) -> None:
-            last = run.n_steps if n > 1 else run.first_step
+            last = timing.n_steps if n > 1 else timing.first_step
             _every_step(
-                every, run.first_step, last, places, kind, law, dt, lanes, train, rails, magnet,
-                circuits, watch, outcome,
+                every, timing.first_step, last, footprints, kind, law, dt, lanes, train, rails,
+                magnet, circuits, watch, outcome,
             )  # fmt: skip
 
-        steps = run.n_steps + 1 - run.first_step
+        steps = timing.n_steps + 1 - timing.first_step
         poles += moving * per_call(-(-steps // every), calls)
     rest = per_step - links - stepped - of_rails - poles - states
     law, under, counted_states = (

@@ -10,12 +10,17 @@ import yaml
 from jsonschema import Draft202012Validator
 from numpy.testing import assert_allclose
 
-from maglev import ConfigError, catalogue, load_config, parameters
+from maglev import ConfigError, catalogue, load_config, units
 from maglev.config import config_text, from_mapping, overlay
 from maglev.measurements import load_measurements
 from maglev.parameters import Config
+from maglev.stage import named
+from maglev.vocabulary import PAPER_RESPONSES, RESPONSES
 
 ROOT = Path(__file__).parents[1]
+
+KNOWN = " or ".join(", ".join(f"'{name}'" for name in RESPONSES).rsplit(", ", 1))
+"""The responses as a sentence names them."""
 
 
 @pytest.mark.parametrize(
@@ -71,7 +76,13 @@ ROOT = Path(__file__).parents[1]
         ),
         (
             "cases: {validation: {coefficient_of_variation: 0}}",
-            "cases.validation.coefficient_of_variation must be greater than 0, got 0",
+            "cases.validation.coefficient_of_variation is no longer a key: write it into the law "
+            "of each quantity, such as random: {gains.suspension_proportional: {law: normal, "
+            "coefficient_of_variation: 0.1}}",
+        ),
+        (
+            "cases: {a: {random: {passage.speed: {coefficient_of_variation: 0}}}}",
+            "cases.a.random.passage.speed.coefficient_of_variation must be greater than 0, got 0",
         ),
         (
             "cases: {validation: {methods: [mcm, amc]}}",
@@ -79,14 +90,44 @@ ROOT = Path(__file__).parents[1]
         ),
         (
             "cases: {validation: {random_gains: [suspension]}}",
-            "cases.validation.random_gains.0 must be 'suspension_proportional', "
-            "'suspension_derivative', 'guidance_proportional' or 'guidance_derivative', "
-            "got 'suspension'",
+            "cases.validation.random_gains is no longer a key: write the gains with their laws "
+            "under random, such as random: {gains.suspension_proportional: {law: normal, "
+            "coefficient_of_variation: 0.1}}",
         ),
         (
-            "cases: {validation: {correlation: 0.5}}",
-            "cases.validation.correlation is not supported: the random gains are independent; "
-            "leave it out",
+            "cases: {a: {random: {train.car_body.weight: {coefficient_of_variation: 0.1}}}}",
+            "cases.a.random.train.car_body.weight is no key of the configuration: there is no "
+            "'weight'",
+        ),
+        (
+            "cases: {a: {random: {irregularity.sides: {coefficient_of_variation: 0.1}}}}",
+            "cases.a.random.irregularity.sides cannot be random: its value is no number, but "
+            "'shared'",
+        ),
+        (
+            "cases: {a: {random: {study.n_population: {coefficient_of_variation: 0.1}}}}",
+            "cases.a.random.study.n_population cannot be random; the sections whose numbers can "
+            "are train, guideway, irregularity, gains, control, passage, such as "
+            "train.car_body.mass",
+        ),
+        (
+            "cases: {a: {set: {passage.speed: 90 m/s}, "
+            "random: {passage.speed: {coefficient_of_variation: 0.01}}}}",
+            "cases.a.passage.speed is both set and random; leave one of them out",
+        ),
+        (
+            "cases: {a: {random: {train.n_cars: {coefficient_of_variation: 0.1}}}}",
+            "cases.a.random.train.n_cars: it counts, so that its law must be discrete, of integers",
+        ),
+        (
+            "cases: {a: {random: {train.car_body.mass: {law: uniform, low: 29 t, high: 39}}}}",
+            "cases.a.random.train.car_body.mass: high must carry its unit, such as '39.0 kg'",
+        ),
+        (
+            "cases: {a: {correlation: [[gains.suspension_proportional, passage.speed, 0.5]]}}",
+            "cases.a.correlation: passage.speed is not random; the random ones are "
+            "gains.suspension_proportional, gains.suspension_derivative, "
+            "gains.guidance_proportional, gains.guidance_derivative",
         ),
         (
             "cases: {validation: {n_span: 4}}",
@@ -95,14 +136,25 @@ ROOT = Path(__file__).parents[1]
         ),
         (
             "cases: {validation: {random_track: true}}",
-            "cases.validation.random_track works with the method mcm only, got osm, asm_paper, "
-            "asm: a surrogate of the gains cannot know the track of each sample",
+            "cases.validation.random_track is no longer a key: write track: random",
         ),
         (
-            "cases: {validation: {coefficient_of_variation: 0.8}}",
-            "cases.validation.coefficient_of_variation = 0.8 leaves only 36 % of the gains "
-            "statically stable (k_p > i0/delta0, more for the group half, k_d >= 0), expected at "
-            "least half; lower it, raise the mean gains or take the case away with null",
+            "cases: {validation: {track: 1}}",
+            "cases.validation.track must be fixed, random or a number of tracks from 2, got 1",
+        ),
+        (
+            "cases: {a: {random: {gains.suspension_proportional: {law: lognormal, "
+            "mean: 2000 A/m, coefficient_of_variation: 0.1}}}}",
+            "cases.a.random leaves only 1 % of the gains statically stable (k_p > i0/delta0, more "
+            "for the group half, k_d >= 0), expected at least half; lower the variation, raise the "
+            "mean gains or take the case away with null",
+        ),
+        (
+            "only: [mine]",
+            "only names 'mine', which is no case; there are: validation, "
+            "only_suspension_proportional, only_suspension_derivative, only_guidance_proportional, "
+            "only_guidance_derivative, all_gains, cov_004, cov_006, cov_008, cov_010, cov_012, "
+            "cov_014, group_ends, group_half, group_lumped, lag_2ms",
         ),
         (
             "cases: {New: {}}",
@@ -111,9 +163,74 @@ ROOT = Path(__file__).parents[1]
         ),
         (
             "study: {asm_paper: {response: girder}}",
-            "study.asm_paper.response must be 'girder_displacement_z', 'girder_displacement_y', "
-            "'girder_acceleration_z', 'girder_acceleration_y', 'car_body_acceleration_z' or "
-            "'car_body_acceleration_y', got 'girder'",
+            f"study.asm_paper.response must be {KNOWN}, got 'girder'",
+        ),
+        (
+            "study: {responses: [girder]}",
+            f"study.responses.0 must be {KNOWN}, got 'girder'",
+        ),
+        (
+            "study: {responses: [girder_displacement_z, girder_displacement_z]}",
+            "study.responses must not name anything twice, got girder_displacement_z, "
+            "girder_displacement_z",
+        ),
+        (
+            "limit_states: {ride: {response: car_body_acceleration_z, limit: 4 mm}}",
+            "limit_states.ride.limit must be given in m/s^2 or a unit that converts to it, "
+            "got '4 mm'",
+        ),
+        (
+            "limit_states: {my ride: {response: car_body_acceleration_z, limit: 0.15}}",
+            "limit_states.my ride.limit must carry its unit, such as '0.15 m/s^2'",
+        ),
+        (
+            "limit_states: {ride: {limit: 0 m/s^2}}",
+            "limit_states.ride.limit must be greater than 0 and finite, got '0 m/s^2'",
+        ),
+        (
+            "limit_states: {sag: {response: sag, limit: 4 mm}}",
+            f"limit_states.sag.response must be {KNOWN}, got 'sag'",
+        ),
+        (
+            "limit_states: {sag: {response: girder_displacement_z}}",
+            "limit_states.sag.limit is missing: a response needs a limit, a limit a response",
+        ),
+        (
+            "limit_states: {out of service: {any_of: [ride, gap]}}",
+            "limit_states.out of service.any_of names no limit state: there is no 'gap', known "
+            f"are: {', '.join(Config().limit_states)}, out of service, lost",
+        ),
+        (
+            "limit_states: {a: {any_of: [b]}, b: {all_of: [lost, a]}}",
+            "limit_states.a goes in a circle: a -> b -> a",
+        ),
+        (
+            "limit_states: {a: {any_of: [lost], all_of: [ride]}}",
+            "limit_states.a.any_of cannot stand beside all_of: a limit state has a response with "
+            "its limit, or any_of, or all_of",
+        ),
+        (
+            "limit_states: {a: {any_of: [lost], limit: 4 mm}}",
+            "limit_states.a.limit cannot stand beside any_of: a limit state has a response with "
+            "its limit, or any_of, or all_of",
+        ),
+        (
+            "limit_states: {a: {target: 0.1}}",
+            "limit_states.a.response is missing: a limit state has a response with its limit, or "
+            "any_of, or all_of",
+        ),
+        (
+            "limit_states: {a: {any_of: [ride, ride]}}",
+            "limit_states.a.any_of must not name anything twice, got ride, ride",
+        ),
+        (
+            "limit_states: {lost: {any_of: [ride]}}",
+            "limit_states.lost cannot name a limit state: use a line of text that neither begins "
+            "nor ends with a space; lost is always there and means lost levitation",
+        ),
+        (
+            "limit_states: {ride: {target: 2}}",
+            "limit_states.ride.target must be less than 1, got 2",
         ),
         (
             "study: {asm: {n_candidates: 50}}",
@@ -154,9 +271,9 @@ def test_a_speed_may_be_given_in_any_unit_of_speed():
     assert_allclose(from_mapping({"passage": {"speed": "432 km/h"}}).passage.speed, 120)
 
 
-@pytest.mark.parametrize(("unit", "si"), parameters._FACTORS)
+@pytest.mark.parametrize(("unit", "si"), units._FACTORS)
 def test_the_short_cut_for_common_units_agrees_with_the_library(unit, si):
-    times, over = parameters._FACTORS[unit, si]
+    times, over = units._FACTORS[unit, si]
     exact = pint.UnitRegistry().Quantity(430.0, unit).to(si).magnitude
     assert_allclose(430.0 * times / over, exact, rtol=1e-15)
 
@@ -185,6 +302,55 @@ def test_another_law_replaces_the_spectrum_below_it_as_a_whole():
     base = {"irregularity": {"vertical": {"law": "power", "exponent": 2.0}}}
     over = {"irregularity": {"vertical": {"law": "german"}}}
     assert overlay(base, over) == over
+
+
+def test_a_users_limit_state_drives_and_a_shipped_one_does_not():
+    shipped = Config()
+    assert shipped.responses_of_designs == PAPER_RESPONSES
+    assert not any(state.drives for state in shipped.limit_states.values())
+    own = {"response": "girder_acceleration_y", "limit": "0.2 m/s^2"}
+    study = {"responses": ["girder_displacement_z"]}
+    found = from_mapping({"study": study, "limit_states": {"P(a > 0.2)": own}})
+    assert found.responses_of_designs == ("girder_displacement_z", "girder_acceleration_y")
+    assert {"girder_acceleration_y", "car_body_acceleration_z"} < set(found.responses_of_study)
+    joined = from_mapping({"study": study, "limit_states": {"both": {"all_of": ["ride", "lost"]}}})
+    assert joined.responses_of_designs == ("girder_displacement_z", "car_body_acceleration_z")
+    chosen = {"asm": {"responses": ["girder_displacement_y"]}}
+    assert from_mapping({"study": chosen}).responses_of_designs == ("girder_displacement_y",)
+
+
+def test_a_limit_state_written_in_full_replaces_the_shipped_one():
+    softer = from_mapping({"limit_states": {"ride": {"limit": "0.5 m/s^2"}}}).limit_states["ride"]
+    assert softer.threshold == 0.5
+    assert (softer.drives, softer.target) == (False, 2.74e-5)
+    own = {"response": "car_body_acceleration_z", "limit": "50 cm/s^2"}
+    mine = from_mapping({"limit_states": {"ride": own}}).limit_states["ride"]
+    assert_allclose(mine.threshold, 0.5)
+    assert (mine.drives, mine.target, mine.source) == (True, None, "")
+    assert "ride" not in from_mapping({"limit_states": {"ride": None}}).limit_states
+    state = {"response": "car_body_acceleration_z", "limit": "25e-2"}  # a number to no YAML
+    with pytest.raises(ConfigError, match=r"limit must carry its unit, such as '0.25 m/s\^2'"):
+        from_mapping({"limit_states": {"mine": state}})
+
+
+def test_a_threshold_moves_no_part_but_that_of_the_limit_states():
+    def parts(limit, name="ride"):
+        own = {"response": "girder_displacement_y", "limit": "1 m"}
+        config = from_mapping(
+            {
+                "study": {"responses": ["girder_displacement_z"]},
+                "limit_states": {"ride": {"limit": limit}, "sway": own},
+            }
+        )
+        part = named(name).slice(config, "validation", "asm")
+        again = from_mapping(part)  # as the stage reads it
+        assert named(name).slice(again, "validation", "asm") == part
+        return part
+
+    for name in ("design", "surrogate", "density", "limits", "eev"):
+        assert parts("0.5 m/s^2", name) == parts("0.6 m/s^2", name)
+    assert parts("0.5 m/s^2", "limit_states") != parts("0.6 m/s^2", "limit_states")
+    assert "girder_displacement_y" in parts("0.5 m/s^2", "surrogate")["study"]["responses"]
 
 
 def test_null_removes_a_case_and_the_written_configuration_says_so(tmp_path):

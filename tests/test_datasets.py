@@ -8,7 +8,18 @@ import pytest
 import xarray as xr
 
 from maglev import datasets
-from maglev.datasets import LAYOUTS, VARIABLES, describe, read, write
+from maglev.datasets import LAYOUTS, describe, read, write
+from maglev.vocabulary import GAIN_KEYS, PAPER_RESPONSES
+
+WORDS = {
+    "response": list(PAPER_RESPONSES),
+    "parameter": [f"gains.{key}" for key in GAIN_KEYS],
+    "method": ["mcm", "asm"],
+    "case": ["validation", "mine"],
+    "limit_state": ["lost", "ride", "out of service"],
+}
+
+ORDER = "check_coordinate_variables_strict_monotonicity"
 
 CONFIG = {"seed": 3, "demonstration": False, "passage": {"speed": "100.0 m/s"}}
 
@@ -20,22 +31,28 @@ def filled(layout):
     sizes |= {"method": 2, "failure_probability": 3, "round": 2, "step": 3, "cell": 5, "check": 2}
     sizes |= {"source": 2, "grid_derivative": 2, "grid_proportional": 3}
     sizes |= {"train_part": 9, "current_lag": 2, "track": 3, "curve": 2, "beam_frequency": 4}
+    sizes |= {"path_step": 13, "quantile_level": 3}
+    sizes |= {"case": 2, "limit_state": 3}
     names = [*LAYOUTS[layout].variables, *LAYOUTS[layout].optional]
-    dims = {dim for name in names for dim in VARIABLES[name].dims}
+    of = {name: LAYOUTS[layout].variable(name) for name in names}
+    dims = {dim for name in names for dim in of[name].dims}
     coords = {dim: np.arange(sizes[dim]) for dim in sorted(dims)}
+    coords |= {dim: WORDS[dim][: sizes[dim]] for dim in dims & set(WORDS)}
     if "side" in dims:
         coords["side"] = np.array([-1, 1])
 
     def values(name):
-        variable = VARIABLES[name]
+        variable = of[name]
         shape = tuple(sizes[dim] for dim in variable.dims)
         if variable.flags is not None:
             return np.full(shape, next(iter(variable.flags)))
+        if variable.dtype == datasets.TEXT:
+            return np.full(shape, "girder_displacement_z")
         if variable.dtype.startswith("int"):
             return np.ones(shape, dtype=int)
         return np.arange(1, 1 + np.prod(shape, dtype=int)).reshape(shape) / 8
 
-    return xr.Dataset({n: (VARIABLES[n].dims, values(n)) for n in names}, coords=coords)
+    return xr.Dataset({n: (of[n].dims, values(n)) for n in names}, coords=coords)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
@@ -46,7 +63,34 @@ def test_what_is_written_reads_back_with_units_and_meaning(tmp_path, layout):
     xr.testing.assert_allclose(found, describe(made))
     for name in found.variables:
         assert found[name].attrs["long_name"], name
-        assert {"units", "units_by_response", "flag_meanings"} & set(found[name].attrs), name
+        explained = {"units", "units_by_response", "units_by_limit_state", "flag_meanings"}
+        if found[name].dtype.kind != "U" and name != "parameter_value":  # its stage knows the units
+            assert explained & set(found[name].attrs), name
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_places_are_found_by_their_names_in_every_file(tmp_path, layout):
+    made = filled(layout)
+    write(made, tmp_path / "f.nc", layout, config=CONFIG, code="abc")
+    with xr.open_dataset(tmp_path / "f.nc") as found:
+        for dim in set(found.dims) & set(WORDS):
+            last = {dim: WORDS[dim][found.sizes[dim] - 1]}
+            xr.testing.assert_equal(found.sel(last), made.isel({dim: -1}))
+        assert "sample" not in found.dims or found["sample"].dtype.kind == "i"
+    numbered = {dim: (dim, np.arange(made.sizes[dim])) for dim in set(made.dims) & set(WORDS)}
+    for dim, number in numbered.items():
+        with pytest.raises(ValueError, match=f"'{dim}' must name its places in words"):
+            datasets.check(describe(made).assign_coords({dim: number}), layout)
+
+
+def test_each_response_has_the_unit_of_its_name_whatever_their_order():
+    made = filled("density").isel(response=[3, 0])
+    found = describe(made)
+    assert found["value"].attrs["units_by_response"] == "m s-2, m"
+    assert found["density"].attrs["units_by_response"] == "m-1 s2, m-1"
+    states = filled("limit_states")
+    states["state_response"] = ("limit_state", ["none", "girder_acceleration_z", "none"])
+    assert describe(states)["threshold"].attrs["units_by_limit_state"] == "1, m s-2, 1"
 
 
 def test_equal_data_give_equal_bytes_and_no_debris(tmp_path):
@@ -136,6 +180,8 @@ def test_files_follow_the_cf_conventions(tmp_path, layout):
     scores = suite.run_all(dataset, ["cf:1.11"])
     results, errors = scores["cf:1.11"]
     dataset.close()
+    if set(filled(layout).dims) & set(WORDS):  # the checker takes differences of words too
+        assert errors.pop(ORDER)[0].args[0].endswith("'str' and 'str'")
     assert not errors
     messages = [m for r in results if r.value[0] < r.value[1] for m in r.msgs]
     assert not messages

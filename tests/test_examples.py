@@ -14,13 +14,21 @@ from maglev import uncertainty
 MODULES = [one.name for one in pkgutil.walk_packages(maglev.__path__, "maglev.") if not one.ispkg]
 
 FOR_USERS = [
+    f"maglev.{name}" for name in ("config", "fingerprint", "measurements", "profiles", "stage")
+]
+FOR_USERS += [
     f"maglev.mechanics.{name}"
     for name in (
+        "bodies",
+        "comfort",
         "control",
         "course",
+        "guideway",
         "irregularity",
         "linear",
         "moving_load",
+        "responses",
+        "statics",
         "timoshenko",
         "train",
     )

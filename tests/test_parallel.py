@@ -31,7 +31,7 @@ wall, process = time.perf_counter(), time.process_time()
 passages = simulate(config, gains)
 print(json.dumps({
     "extremes": [passages[name].values.tobytes().hex() for name in sorted(passages.data_vars)],
-    "loaded": sum(_kernels.passage.stats.cache_hits.values()),
+    "loaded": sum(_kernels.cross.stats.cache_hits.values()),
     "cores": (time.process_time() - process) / (time.perf_counter() - wall),
 }))
 """

@@ -35,7 +35,7 @@ cases:
   group_half: null
   group_lumped: null
   lag_2ms: {n_spans: 1, n_samples: 2}
-  random_track: {n_spans: 1, methods: [mcm], n_samples: 2, random_track: true}
+  random_track: {n_spans: 1, methods: [mcm], n_samples: 2, track: random}
 """
 
 
@@ -94,14 +94,16 @@ def test_a_dry_run_of_all_lists_every_step_of_the_method(fresh):
         "irregularity": 1, "guideway_modes": 1, "passage": 1, "deflection": 1, "dynamic_factor": 1,
         "baseline_points": 3, "representative_points": 3, "initial_points": 5,
         "candidate_points": 4, "baseline_chunk": 4, "baseline": 3, "design": 5, "track_runs": 4,
-        "surrogate": 5, "eev": 5, "density": 8, "limits": 8,
+        "surrogate": 5, "eev": 5, "density": 8, "limits": 8, "limit_states": 8,
         "accuracy": 2, "track_split": 1, "statistics_check": 1, "table1": 1, "paper_and_ours": 1,
         "prediction": 2, "stability": 1, "control_study": 1, "stiffness_check": 1,
         "fig7": 1, "fig8": 1, "histories": 1, "gaps": 1, "modes": 1, "all": 1,
         "fig9": 1, "fig10": 1, "fig11": 1, "fig12": 1, "fig15": 1, "fig16": 1, "fig_sobol": 1,
         "fig_stability": 1, "fig_accuracy": 1, "fig_scatter": 1, "fig_track_split": 1,
         "fig_control_density": 1, "fig_control_limits": 1, "fig_stiffness": 1,
+        "limit_state_table": 1, "fig_exceedance": 4,
         "tracks": 1, "line": 1, "fig_tracks": 1, "fig_track_limits": 1,
+        "density_in_time": 1, "fig_in_time": 1,
     }.items()  # fmt: skip
     assert fresh.would_run() == jobs
 

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from maglev.config import load_config
     from maglev.errors import ConfigError, UserError
-    from maglev.simulation import simulate
+    from maglev.simulation import cost_of, simulate
 
-__all__ = ["ConfigError", "UserError", "load_config", "simulate"]
+__all__ = ["ConfigError", "UserError", "cost_of", "load_config", "simulate"]
 
 _HOME = {
     "ConfigError": "maglev.errors",
     "UserError": "maglev.errors",
+    "cost_of": "maglev.simulation",
     "load_config": "maglev.config",
     "simulate": "maglev.simulation",
 }

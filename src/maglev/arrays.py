@@ -1,4 +1,4 @@
-"""Types of the arrays that the package hands around."""
+"""Types of the arrays of the package."""
 
 from __future__ import annotations
 

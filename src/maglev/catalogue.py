@@ -16,8 +16,8 @@ import yaml
 from pydantic import TypeAdapter
 from pydantic.fields import FieldInfo
 
-from maglev.datasets import CONVENTIONS, LAYOUTS, VARIABLES, Variable
-from maglev.parameters import CONFIDENCE, SOURCES, Config, Parameters
+from maglev.datasets import CONVENTIONS, LAYOUTS, TEXT, VARIABLES, Variable
+from maglev.parameters import CONFIDENCE, SOURCES, Config, Law, Parameters
 from maglev.stage import flag, stages, summaries
 from maglev.vocabulary import METHODS
 
@@ -109,6 +109,10 @@ def _config_lines(
                 yield ""
             yield from _commented(f"{pad}{name}:", _summary(type(value)), pad)
             yield from _config_lines(value, _origins(field), indent + 1)
+        elif isinstance(value, Mapping) and _named_section(field) is Law:
+            yield from _commented(f"{pad}{name}:", field.description or "", pad)
+            for key, law in value.items():
+                yield f"{pad}  {key}: {_yaml_value(law.quantities())}"
         elif isinstance(value, Mapping) and _named_section(field) is not None:
             yield ""
             yield from _commented(f"{pad}{name}:", field.description or "", pad)
@@ -172,7 +176,7 @@ def _object_schema(
         sections = _sections(field)
         named = _named_section(field)
         if named is not None:
-            one = {"oneOf": [_object_schema(named, named(), {}), {"type": "null"}]}
+            one = {"oneOf": [_object_schema(named, None, {}), {"type": "null"}]}
             properties[name] = {
                 "type": "object",
                 "description": field.description,
@@ -232,7 +236,7 @@ def _parameter_rows(
             continue
         named = _named_section(field)
         if named is not None:
-            nested.append((f"{name}.<name>", named(), {}))
+            nested.append((f"{name}.<name>", named.model_construct(), {}))
             shown = ", ".join(f"`{key}`" for key in value)
             rows.append(f"| `{name}` | {shown} | {field.description} |  |  |")
             continue
@@ -277,7 +281,7 @@ def _variable_row(name: str, variable: Variable) -> str:
     if variable.flags is not None:
         meaning += ": " + ", ".join(f"{key} {word}" for key, word in variable.flags.items())
     dims = ", ".join(variable.dims) or "(none)"
-    unit = "" if variable.flags is not None else variable.units
+    unit = "" if variable.flags is not None or variable.dtype == TEXT else variable.units
     return f"| `{name}` | {dims} | {unit} | {meaning} | {variable.dtype} |"
 
 
@@ -303,11 +307,11 @@ def dataset_tables() -> str:
     for name, layout in LAYOUTS.items():
         lines += [f"## `{name}`", "", layout.title + ".", "", *header]
         for variable in (*layout.variables, *layout.optional):
-            row = _variable_row(variable, VARIABLES[variable])
+            row = _variable_row(variable, layout.variable(variable))
             if variable in layout.optional:
                 row = row.replace("` |", "` (if asked) |", 1)
             lines.append(row)
-            used.update((variable, *VARIABLES[variable].dims))
+            used.update((variable, *layout.variable(variable).dims))
         lines.append("")
     coordinates = [name for name in VARIABLES if VARIABLES[name].dims == (name,)]
     lines += ["## Coordinates", "", *header]

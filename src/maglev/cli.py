@@ -116,6 +116,23 @@ def figure(name: str, data: tuple[Path, ...], out: Path) -> None:
     draw(name, data, out)
 
 
+@main.command()
+@click.argument("words", nargs=-1, required=True)
+def figures(words: tuple[str, ...]) -> None:
+    """Draw several figures in one process: NAME OUT DATA… for each, with a + between two."""
+    from itertools import groupby
+
+    from maglev.figures import draw
+
+    for together, group in groupby(words, key=lambda word: word != "+"):
+        if not together:
+            continue
+        name, out, *data = [*group, "", ""]
+        if name not in FIGURES:
+            raise click.UsageError(f"there is no figure '{name}', known are: {', '.join(FIGURES)}")
+        draw(name, [Path(one) for one in data if one], Path(out))
+
+
 def _command(stage: Stage) -> click.Command:
     """Make the command of a stage from its declaration."""
     from maglev.stage import flag, summary
@@ -190,7 +207,7 @@ def _run(stage: Stage) -> Callable[..., None]:
 
 
 def _of_track(files: dict[str, Any]) -> dict[str, str]:
-    """Of which track a file is that is made of others, where they say it."""
+    """Attributes on the track of a file that is made of others, where they have them."""
     every = [
         one
         for found in files.values()
@@ -206,7 +223,7 @@ def _files(stage: Stage, given: dict[str, Any]) -> dict[str, Any]:
     Raises
     ------
     click.UsageError
-        If a file is missing, or one is given that the method has no use for.
+        If a file is missing, or the method does not use one that is given.
     """
     from maglev.stage import flag
 

@@ -1,8 +1,7 @@
 """The cache of compiled functions: one folder for each state of the code compiled together.
 
-Numba's own cache looks at the file of a function alone, and goes on giving the old answer after an
-edit of a function that it calls in another file.  Here every edit of any such file leads to a new
-folder.
+Numba's own cache checks the file of a function alone, and serves stale code after an edit of a
+function that it calls in another file.  Here every edit of any such file leads to a new folder.
 """
 
 from __future__ import annotations
@@ -66,4 +65,4 @@ def folder() -> Path:
 numba.core.config.CACHE_DIR = str(folder())
 
 kernel: Callable[..., Any] = partial(numba.njit, cache=True, error_model="numpy")
-"""Compile a function, keep it, and let a division by zero give what the processor gives."""
+"""Compile and cache a function; a division by zero gives infinity or NaN and raises nothing."""

@@ -6,8 +6,12 @@ A configuration file says only what differs from the defaults, or from the file 
 
 from __future__ import annotations
 
+import copy
+import csv
 import difflib
+import math
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import UnionType
@@ -42,8 +46,17 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     ConfigError
-        If there is no such file, or it is not YAML, or a key stands twice, or its top level is
-        something else.
+        If there is no such file, it is not YAML, a key stands twice, or the top level is no
+        mapping.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "fast.yaml"
+    ...     _ = path.write_text("passage: {speed: 500 km/h}")
+    ...     read_yaml(path)
+    {'passage': {'speed': '500 km/h'}}
     """
     try:
         text = Path(path).read_text(encoding="utf-8")
@@ -69,7 +82,8 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
 def overlay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Lay one nested mapping over another, key by key; neither is changed.
 
-    A spectrum of another law replaces the one below it as a whole.
+    A spectrum of another law replaces the one below it as a whole, and so does a limit state that
+    says all of itself: a response with its limit, or what it joins.
 
     Examples
     --------
@@ -81,10 +95,16 @@ def overlay(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         below = merged.get(key)
         if isinstance(below, Mapping) and isinstance(value, Mapping):
             same_law = value.get("law", below.get("law")) == below.get("law")
-            merged[key] = overlay(below, value) if same_law else dict(value)
+            whole = not same_law or _is_limit_state(value)
+            merged[key] = dict(value) if whole else overlay(below, value)
         else:
             merged[key] = value
     return merged
+
+
+def _is_limit_state(value: Mapping[str, Any]) -> bool:
+    """Whether keys and values say all of a limit state."""
+    return {"response", "limit"} <= set(value) or bool({"any_of", "all_of"} & set(value))
 
 
 def _file_keys(model: type[Parameters], path: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -96,6 +116,15 @@ def _file_keys(model: type[Parameters], path: tuple[str, ...] = ()) -> Iterator[
             yield (*path, name)
 
 
+def _files_of_laws(mapping: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    """Yield the path of every key of a random quantity that can name a file."""
+    cases = mapping.get("cases")
+    for name, case in cases.items() if isinstance(cases, Mapping) else ():
+        random = case.get("random") if isinstance(case, Mapping) else None
+        for key in random if isinstance(random, Mapping) else ():
+            yield ("cases", name, "random", key, "file")
+
+
 def named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield the path of every key of the mapping that names a file, and the name.
 
@@ -104,7 +133,7 @@ def named_files(mapping: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], s
     >>> list(named_files({"irregularity": {"profile_file": "track.csv"}}))
     [(('irregularity', 'profile_file'), 'track.csv')]
     """
-    for path in _file_keys(Config):
+    for path in (*_file_keys(Config), *_files_of_laws(mapping)):
         value: Any = mapping
         for part in path:
             value = value.get(part) if isinstance(value, Mapping) else None
@@ -137,7 +166,17 @@ def read_overlays(path: str | Path, above: tuple[Path, ...] = ()) -> dict[str, A
     Raises
     ------
     ConfigError
-        As `read_yaml` does, or if files extend each other in a circle.
+        As `read_yaml`, or if files extend each other in a circle.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = (Path(folder) / "base.yaml").write_text("{seed: 1, run: base}")
+    ...     path = Path(folder) / "other.yaml"
+    ...     _ = path.write_text("{extends: base.yaml, seed: 2}")
+    ...     read_overlays(path)
+    {'seed': 2, 'run': 'base'}
     """
     path = Path(path)
     if path.resolve() in above:
@@ -170,11 +209,66 @@ def from_mapping(mapping: Mapping[str, Any]) -> Config:
     >>> from_mapping({"passage": {"speed": "360 km/h"}}).passage.speed
     100.0
     """
-    config: Config = validated(Config, overlay(Config().quantities(), mapping))
+    whole = overlay(Config().quantities(), mapping)
     for path, name in named_files(mapping):
         if not Path(name).is_file():
             raise ConfigError(f"{'.'.join(path)} names a file that does not exist: {name}")
+        if path[-1] == "file":
+            whole = _with_sample(whole, path[:-1], name)
+    config: Config = validated(Config, whole)
     return config
+
+
+def _with_sample(whole: dict[str, Any], path: Sequence[str], name: str) -> dict[str, Any]:
+    """The values of a sample in place of the name of its file."""
+    law: Any = whole
+    for part in path:
+        law = law[part]
+    held = {key: value for key, value in law.items() if key != "file"}
+    nested: Any = {**held, "values": sample_values(name)}
+    *outer, last = path
+    target = whole = copy.deepcopy(whole)
+    for part in outer:
+        target = target[part]
+    target[last] = nested
+    return whole
+
+
+def sample_values(path: str | Path) -> list[str | float]:
+    """Values of a sample from the first column of a CSV file, with the unit of its heading.
+
+    Parameters
+    ----------
+    path
+        A heading such as ``mass [t]``, or ``ratio`` for a pure number, then a number a line.
+
+    Returns
+    -------
+    values
+        As a configuration file writes them.
+
+    Raises
+    ------
+    ConfigError
+        If there is no heading, or a line begins with something else than a finite number.
+    """
+    with Path(path).open(encoding="utf-8-sig", newline="") as stream:
+        rows = [row for row in csv.reader(stream) if row and any(cell.strip() for cell in row)]
+    heading = rows[0][0].strip() if rows else ""
+    found = re.fullmatch(r"[^\[\]]*[^\W\d][^\[\]]*(\[(?P<unit>[^\[\]]+)\])?", heading)
+    if found is None:
+        raise ConfigError(f"{path}, line 1: expected a heading such as 'mass [t]', got '{heading}'")
+    unit = (found["unit"] or "").strip()
+    values: list[str | float] = []
+    for number, row in enumerate(rows[1:], start=2):
+        try:
+            value = float(row[0])
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise ConfigError(f"{path}, line {number}: expected a number, got '{row[0]}'")
+        values.append(f"{value!r} {unit}" if unit and unit != "-" else value)
+    return values
 
 
 def validated(model: type[Any], mapping: Mapping[str, Any]) -> Any:
@@ -223,6 +317,37 @@ def load_config(*paths: str | Path) -> Config:
     return from_mapping(mapping)
 
 
+def layered(
+    paths: Sequence[str | Path], over: Mapping[str, Any], lowest: str | Path
+) -> dict[str, Any]:
+    """Values of configuration files laid over each other, as the workflow is given them.
+
+    Parameters
+    ----------
+    paths
+        Files in rising order; names of files in each are relative to it.
+    over
+        Values that lie over all files.
+    lowest
+        File below all others, unless one of them says what it extends.
+
+    Returns
+    -------
+    mapping
+        For `from_mapping`.
+
+    Raises
+    ------
+    ConfigError
+        As `read_overlays`.
+    """
+    near = [os.path.relpath(path) for path in paths]
+    below = {} if any("extends" in read_yaml(path) for path in near) else read_overlays(lowest)
+    for path in near:
+        below = overlay(below, read_overlays(path))
+    return overlay(below, over)
+
+
 def config_text(mapping: Mapping[str, Any], directory: str | Path = ".") -> str:
     """Text of a configuration file in a given directory.
 
@@ -259,7 +384,7 @@ def _shown(value: Any) -> str:
 
 def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, list[str]]:
     """Return the dotted key, without the tags of unions, and the known keys beside it."""
-    place: list[str] = []
+    dotted: list[str] = []
     candidates: tuple[Any, ...] = (model,)
     named: Any = None
     for part in loc:
@@ -271,7 +396,7 @@ def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, li
         if tagged:
             candidates = tuple(tagged)
             continue
-        place.append(str(part))
+        dotted.append(str(part))
         fields = [c.model_fields[part] for c in candidates if part in c.model_fields]
         annotation = fields[0].annotation if fields else named
         named = None
@@ -280,12 +405,12 @@ def _keys_of(model: type[Parameters], loc: Sequence[str | int]) -> tuple[str, li
             continue
         members = get_args(annotation) if isinstance(annotation, UnionType) else (annotation,)
         candidates = tuple(m for m in members if isinstance(m, type) and issubclass(m, Parameters))
-    return ".".join(place), [name for c in candidates for name in c.model_fields]
+    return ".".join(dotted), [name for c in candidates for name in c.model_fields]
 
 
-def _unit_of(model: type[Parameters], place: str) -> str:
-    """Unit of the quantity at a dotted place, with a space before it; empty if it has none."""
-    *outer, last = place.split(".")
+def _unit_of(model: type[Parameters], dotted: str) -> str:
+    """Unit of the quantity at a dotted key, with a space before it; empty if it has none."""
+    *outer, last = dotted.split(".")
     for name in outer:
         annotation = model.model_fields[name].annotation if name in model.model_fields else None
         if not (isinstance(annotation, type) and issubclass(annotation, Parameters)):
@@ -325,21 +450,21 @@ _PHRASES = {
 def _sentence(model: type[Parameters], mapping: Mapping[str, Any], error: ErrorDetails) -> str:
     """Turn one finding of pydantic into a sentence with the dotted key and the value as written."""
     kind, loc, context = error["type"], error["loc"], error.get("ctx", {})
-    place, known = _keys_of(model, loc)
+    dotted, known = _keys_of(model, loc)
     if kind == "value_error":  # our own words, which begin with the key inside its section
-        return f"{place}.{context['error']}" if place else str(context["error"])
+        return f"{dotted}.{context['error']}" if dotted else str(context["error"])
     if kind == "missing":
-        return f"{place} is missing"
+        return f"{dotted} is missing"
     if kind == "extra_forbidden":
-        section, _, key = place.rpartition(".")
+        section, _, key = dotted.rpartition(".")
         _, known = _keys_of(model, loc[:-1])
         near = difflib.get_close_matches(key, known, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(known)}"
-        return f"{place} is not a known key{f' of {section}' if section else ''}; {hint}"
+        return f"{dotted} is not a known key{f' of {section}' if section else ''}; {hint}"
     value: Any = mapping
-    for part in place.split("."):
+    for part in dotted.split("."):
         value = value.get(part) if isinstance(value, Mapping) else error["input"]
     phrase = _PHRASES.get(kind)
     if phrase is None:
-        return f"{place}: {error['msg']}, got {_shown(value)}"
-    return f"{place} {phrase.format(unit=_unit_of(model, place), **context)}, got {_shown(value)}"
+        return f"{dotted}: {error['msg']}, got {_shown(value)}"
+    return f"{dotted} {phrase.format(unit=_unit_of(model, dotted), **context)}, got {_shown(value)}"

@@ -1,8 +1,8 @@
 """Mistakes of a user, apart from faults of the program.
 
-Whoever refuses what a user has given raises a `UserError` of one sentence: what is wrong, what was
-expected, what came, what to do.  The command line prints the sentence.  Any other exception is a
-fault of the program and shows where it happened.
+A function that refuses a user's value raises a `UserError` of one sentence: what is wrong, what
+was expected, what was given, what to do.  The command line prints the sentence.  Any other
+exception is a fault of the program and shows where it happened.
 """
 
 from __future__ import annotations

@@ -57,6 +57,11 @@ def standing_on(*modules: str, without: Sequence[str] = ()) -> tuple[str, ...]:
     ------
     ValueError
         If there is no such module.
+
+    Examples
+    --------
+    >>> standing_on("compiled")
+    ('maglev.compiled',)
     """
     open_names = [f"{_NAME}.{module}" for module in modules]
     left_out = {f"{_NAME}.{module}" for module in without}
@@ -102,6 +107,11 @@ def code_of(*modules: str, without: Sequence[str] = ()) -> str:
     ------
     ValueError
         If there is no such module.
+
+    Examples
+    --------
+    >>> len(code_of("compiled"))
+    16
     """
     digest = hashlib.sha256()
     for name in standing_on(*modules, without=without):
@@ -113,6 +123,16 @@ def code_of(*modules: str, without: Sequence[str] = ()) -> str:
 
 
 def file_hash(path: str | Path) -> str:
-    """SHA-256 of a file's bytes, in hexadecimal."""
+    """SHA-256 of a file's bytes, in hexadecimal.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "empty"
+    ...     path.touch()
+    ...     file_hash(path)[:8]
+    'e3b0c442'
+    """
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -55,6 +55,13 @@ def measured_here(config: Config) -> Measurements | None:
     ------
     ConfigError
         As `load_measurements`.
+
+    Examples
+    --------
+    >>> from maglev.parameters import Config
+    >>> bare = Config.model_validate({"validation": {"measurements": None}})
+    >>> measured_here(bare) is None
+    True
     """
     validation = config.validation
     if validation.measurements is None or not validation.measured_here:
@@ -79,6 +86,15 @@ def load_measurements(path: str | Path) -> Measurements:
     ------
     ConfigError
         If the file cannot be read, or a key is unknown, missing, or of the wrong kind or unit.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "line.yaml"
+    ...     _ = path.write_text("{line: a test line, span_length: 24.768 m}")
+    ...     load_measurements(path).span_length
+    24.768
     """
     try:
         measurements: Measurements = validated(Measurements, read_yaml(path))

@@ -10,26 +10,38 @@ from __future__ import annotations
 
 import math
 import re
-import tokenize
-from collections.abc import Mapping
-from functools import lru_cache
-from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Callable, Mapping
+from itertools import pairwise, product
+from typing import Any, Literal
 
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
     ValidationError,
+    ValidationInfo,
     field_validator,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
+from maglev import laws
 from maglev.errors import UserError
-from maglev.vocabulary import GAIN_KEYS, GROUPS, Gain, Group, Method, Response, Surrogate
-
-if TYPE_CHECKING:
-    import pint
+from maglev.units import in_unit
+from maglev.vocabulary import (
+    GAIN_KEYS,
+    GROUPS,
+    LOST,
+    PAPER_RESPONSES,
+    RESPONSE_UNITS,
+    RESPONSES,
+    Gain,
+    Group,
+    Method,
+    RecordedResponse,
+    Response,
+    Surrogate,
+)
 
 GRAVITY = 9.80665  # m/s^2, standard gravity (CGPM 1901)
 
@@ -45,17 +57,10 @@ SOURCES = {
     "D": "derived from the other sources",
     "A": "assumed",
 }
-"""What the source letters in the parameter tables stand for."""
+"""Meaning of the source letters in the parameter tables."""
 
 CONFIDENCE = {"H": "high", "M": "medium", "L": "low"}
-"""How far a value can be trusted."""
-
-
-@lru_cache(maxsize=1)
-def _units() -> pint.UnitRegistry:
-    import pint  # half a second, spared where every unit is an SI unit already
-
-    return pint.UnitRegistry()
+"""Meaning of the letters of confidence."""
 
 
 def quantity(
@@ -76,7 +81,7 @@ def quantity(
     unit
         SI unit of the stored number, in the notation of pint; ``""`` for a pure number.
     meaning
-        What the number is, with its symbol.
+        Meaning of the number, with its symbol.
     default
         Value in ``unit``, or a text with its own unit such as ``"430 km/h"``.
     source
@@ -102,7 +107,7 @@ def quantity(
     if below is not None:
         bounds["lt"] = below
     if isinstance(default, str):
-        default = _in_unit(default, unit, "default")
+        default = in_unit(default, unit, "default")
     elif default is not None:
         default = float(default)
     return Field(
@@ -110,51 +115,13 @@ def quantity(
     )
 
 
-_QUANTITY = re.compile(
-    r"\s*(?P<number>[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?)\s*"
-    r"(?P<unit>(?![eE][-+]?\d)[^\W\d].*?)\s*"
-)
-_FACTORS = {
-    ("km/h", "m/s"): (1.0, 3.6),
-    ("mm", "m"): (1.0, 1000.0),
-    ("ms", "s"): (1.0, 1000.0),
-    ("kN", "N"): (1000.0, 1.0),
-}
-"""What a number in the first unit is multiplied with and divided by for the second."""
+def _lists(value: Any) -> Any:
+    """A value with lists in place of tuples, as a file has them."""
+    return [_lists(one) for one in value] if isinstance(value, list | tuple) else value
 
 
-def _unreadable() -> tuple[type[Exception], ...]:
-    """Exceptions of pint for an unreadable unit."""
-    import pint
-
-    python = (ArithmeticError, AssertionError, SyntaxError, TypeError, ValueError)
-    return (pint.errors.PintError, tokenize.TokenError, *python)
-
-
-def _in_unit(text: str, unit: str, key: str) -> float:
-    """Convert a text such as ``"430 km/h"`` to a number in ``unit``."""
-    match = _QUANTITY.fullmatch(text)
-    if match is None:
-        raise ValueError(
-            f"{key} must be a number with a unit of {unit}, such as '1.5 {unit}', got {text!r}"
-        )
-    number = float(match["number"])
-    if match["unit"] == unit:
-        return number
-    if (match["unit"], unit) in _FACTORS:
-        times, over = _FACTORS[match["unit"], unit]
-        return number * times / over
-    try:
-        value = _units().Quantity(number, match["unit"])
-    except _unreadable() as error:
-        raise ValueError(
-            f"{key} must be a number with a unit of {unit}, got {text!r}, whose unit is not known"
-        ) from error
-    if not value.is_compatible_with(unit):
-        raise ValueError(
-            f"{key} must be given in {unit} or a unit that converts to it, got {text!r}"
-        )
-    return float(value.to(unit).magnitude)
+_IN_SI = {"numbers": "SI"}
+"""Context of a validation whose numbers are in SI and carry no unit."""
 
 
 class Parameters(BaseModel):
@@ -164,8 +131,8 @@ class Parameters(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _read_units(cls, data: Any) -> Any:
-        if not isinstance(data, dict):
+    def _read_units(cls, data: Any, info: ValidationInfo) -> Any:
+        if not isinstance(data, dict) or info.context is _IN_SI:
             return data
         converted = dict(data)
         for name, value in data.items():
@@ -177,12 +144,22 @@ class Parameters(BaseModel):
             if isinstance(value, bool):
                 raise ValueError(f"{name} must be a number, got {value}")
             if unit and isinstance(value, str):
-                converted[name] = _in_unit(value, unit, name)
+                converted[name] = in_unit(value, unit, name)
             elif unit and isinstance(value, int | float):
                 raise ValueError(f"{name} must carry its unit, such as '{value} {unit}'")
             elif unit:
                 raise ValueError(f"{name} must be a number with a unit of {unit}, got {value!r}")
         return converted
+
+    def field_named(self, name: str) -> FieldInfo:
+        """Return a field by its name.
+
+        Raises
+        ------
+        KeyError
+            If there is none of that name.
+        """
+        return type(self).model_fields[name]
 
     def quantities(self) -> dict[str, Any]:
         """Return the class as the configuration file would write it, units included."""
@@ -196,13 +173,13 @@ class Parameters(BaseModel):
                 out[name] = [item.quantities() for item in value]
             elif isinstance(value, Mapping):
                 out[name] = {
-                    key: item.quantities() if isinstance(item, Parameters) else item
+                    key: item.quantities() if isinstance(item, Parameters) else _lists(item)
                     for key, item in value.items()
                 }
             elif isinstance(extra, dict) and extra.get("unit") and value is not None:
                 out[name] = f"{value!r} {extra['unit']}"
             elif isinstance(value, tuple):
-                out[name] = list(value)
+                out[name] = _lists(value)
             else:
                 out[name] = value
         return out
@@ -225,6 +202,15 @@ class CarBody(Parameters):
     )
     height: float = quantity(
         "m", "centre of mass above the deck level", 1.5, source="M", confidence="L"
+    )
+    end_distance: float | None = quantity(
+        "m",
+        "distance of the floor's ends from the centre, where accelerations are watched; "
+        "null: half the car pitch",
+        None,
+        source="A",
+        confidence="L",
+        above=0,
     )
 
 
@@ -320,7 +306,7 @@ class Magnet(Parameters):
     """A row of poles on one rigid magnet body, its suspension on the C-frames and its currents.
 
     The magnet hangs with both ends on neighbouring C-frames.  The gap of a pole is the mean over
-    its face, and so is its force on the rail.  Which poles share a circuit says ``control``.
+    its face, and so is its force on the rail.  ``control`` says which poles share a circuit.
     """
 
     mass: float = quantity("kg", "mass", 600, source="H", confidence="M", above=0)
@@ -377,7 +363,7 @@ class Magnet(Parameters):
     )
     preload: float | None = quantity(
         "N",
-        "force at rest; null: what the magnet carries of the train's weight",
+        "force at rest; null: the magnet's part of the train's weight",
         None,
         source="A",
         confidence="L",
@@ -455,6 +441,12 @@ class Train(Parameters):
     def length(self) -> float:
         """Length of the train from nose to tail [m]."""
         return self.n_cars * self.car_pitch
+
+    @property
+    def end_distance(self) -> float:
+        """Distance of the ends of a car body's floor from its centre [m]."""
+        given = self.car_body.end_distance
+        return 0.5 * self.car_pitch if given is None else given
 
 
 class BeamSection(Parameters):
@@ -745,7 +737,7 @@ class Irregularity(Parameters):
     )
     fade_in: float = quantity(
         "m",
-        "length before the guideway over which the irregularity grows from nothing",
+        "length before the guideway over which the irregularity grows from zero",
         50,
         source="A",
         confidence="L",
@@ -846,18 +838,19 @@ class Circuit(Parameters):
 
     ``pole``: every pole has a circuit of its own, fed by its own gap.  ``ends``: two a magnet, each
     fed by the gap at the outermost pole of its half.  ``half``: two a magnet, each fed by the mean
-    gap of its half.  ``lumped``: one a magnet, fed by the mean gap, which its force goes by too.
+    gap of its half.  ``lumped``: one a magnet, fed by the mean gap, from which its forces follow
+    too.
     """
 
     group: Group = Field(
         "pole",
-        description="who shares a circuit: each pole its own, each half fed at the magnet's end "
+        description="sharing of circuits: each pole its own, each half fed at the magnet's end "
         "(ends), each half fed by its mean gap (half), a magnet with one force (lumped)",
         json_schema_extra={"source": "A", "confidence": "L"},
     )
     lag: float = quantity(
         "s",
-        "time constant with which the current follows its command",
+        "time constant of the lag of the current behind its command",
         "0 ms",
         source="A",
         confidence="L",
@@ -1039,7 +1032,7 @@ class TailDesign(Parameters):
     n_candidates: int = _count(16_384, "Sobol' points that rounds choose from", minimum=8)
     batch_size: int = _count(8, "runs of one round")
     aggregate: Literal["sum", "maximum"] = Field(
-        "sum", description="how the gains of several limits become one score"
+        "sum", description="combination of the gains of several limits to one score"
     )
     threshold: float = Field(
         0.02,
@@ -1049,6 +1042,12 @@ class TailDesign(Parameters):
     )
     n_rounds: int = _count(3, "rounds in a row in which the limits must be settled to stop")
     n_largest: int = _count(104, "largest number of runs", minimum=8)
+    responses: tuple[Response, ...] | None = Field(
+        None,
+        description="responses whose limits drive; null: study.responses and those of the limit "
+        "states that drive",
+        min_length=1,
+    )
     surrogate: SurrogateKind = Field("best", description="surrogate of the finished design")
 
 
@@ -1072,12 +1071,41 @@ class Tracks(Parameters):
         return self
 
 
+class InTime(Parameters):
+    """Densities over the time of a passage: real histories at the representative points."""
+
+    cases: tuple[str, ...] = Field(
+        ("validation",), description="cases whose responses are followed; [] for none"
+    )
+    responses: tuple[RecordedResponse, ...] = Field(
+        ("girder_displacement_z", "car_body_acceleration_z"),
+        description="responses that are followed; that of the car body is its size, largest over "
+        "the cars",
+        min_length=1,
+    )
+    n_times: int = _count(
+        600, "times at which densities are given, from start to end of a passage", minimum=3
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> InTime:
+        for key, names in (("cases", self.cases), ("responses", self.responses)):
+            if len(set(names)) < len(names):
+                raise ValueError(f"{key} must not name anything twice, got {', '.join(names)}")
+        return self
+
+
 class Study(Parameters):
     """Settings of densities and limits, for all cases."""
 
     failure_probability: tuple[float, ...] = Field(
         (0.1, 0.01, 0.001),
         description="probabilities of exceedance whose limits are given, from large to small",
+        min_length=1,
+    )
+    responses: tuple[Response, ...] = Field(
+        PAPER_RESPONSES,
+        description="responses that are predicted, beside those of the limit states",
         min_length=1,
     )
     confidence: float = Field(
@@ -1095,12 +1123,16 @@ class Study(Parameters):
     asm_paper: PaperDesign = PaperDesign()
     asm: TailDesign = TailDesign()
     tracks: Tracks = Tracks()
+    in_time: InTime = InTime()
 
     @model_validator(mode="after")
     def _check(self) -> Study:
         levels = self.failure_probability
         if not all(0 < level < 1 for level in levels):
             raise ValueError(f"failure_probability must lie between 0 and 1, got {list(levels)}")
+        for key, names in (("responses", self.responses), ("asm.responses", self.asm.responses)):
+            if names is not None and len(set(names)) < len(names):
+                raise ValueError(f"{key} must not name anything twice, got {', '.join(names)}")
         if any(high <= low for high, low in pairwise(levels)):
             raise ValueError(
                 f"failure_probability must fall from value to value, got {list(levels)}"
@@ -1122,27 +1154,297 @@ class Study(Parameters):
         return self
 
 
+def _pint_unit(unit: str) -> str:
+    """A unit of a response in the notation of the configuration, such as ``m/s^2``."""
+    return {"1": "", "m s-2": "m/s^2"}.get(unit, unit)
+
+
+class LimitState(Parameters):
+    """One limit state: a response and its limit, or several limit states together.
+
+    A passage that loses levitation exceeds every one.
+    """
+
+    response: Response | None = Field(None, description="response that must not exceed the limit")
+    limit: str | float | None = Field(
+        None,
+        description="largest value that the response may have, with a unit of the response; "
+        "a plain number where it has none",
+    )
+    any_of: tuple[str, ...] = Field(
+        (), description="limit states of which one is enough, by name; lost: levitation is lost"
+    )
+    all_of: tuple[str, ...] = Field((), description="limit states that must all be exceeded")
+    target: float | None = Field(
+        None, description="probability that it may have in a passage", gt=0, lt=1
+    )
+    drives: bool = Field(
+        True,
+        description="whether adaptive designs choose runs for its response, or those of its parts",
+    )
+    source: str = Field("", description="where limit and target come from")
+    confidence: Literal["high", "medium", "low"] | None = Field(
+        None, description="how far the limit can be trusted"
+    )
+
+    @field_validator("limit", mode="before")
+    @classmethod
+    def _read_number(cls, limit: Any) -> Any:
+        """Take a plain number that YAML leaves as text, such as 25e-5."""
+        if isinstance(limit, str) and re.fullmatch(r"[-+]?[0-9.]+([eE][-+]?[0-9]+)?", limit):
+            return float(limit)
+        return limit
+
+    @property
+    def threshold(self) -> float:
+        """The limit in the SI unit of the response; NaN where there is none."""
+        if self.response is None or self.limit is None:
+            return math.nan
+        if isinstance(self.limit, str):
+            return in_unit(self.limit, _pint_unit(RESPONSE_UNITS[self.response]), "limit")
+        return self.limit
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the limit states that it joins."""
+        return (*self.any_of, *self.all_of)
+
+    @property
+    def definition(self) -> str:
+        """What it says, in words."""
+        if self.response is not None:
+            return f"{self.response} > {self.limit}"
+        return f"{'any' if self.any_of else 'all'} of: {', '.join(self.parts)}"
+
+    @property
+    def origin(self) -> str:
+        """Source of limit and target, and confidence; empty if none is stated."""
+        confidence = f"confidence: {self.confidence}" if self.confidence else ""
+        return "; ".join(filter(None, (self.source, confidence)))
+
+    @model_validator(mode="after")
+    def _check(self) -> LimitState:
+        said = [
+            key
+            for key in ("response", "limit", "any_of", "all_of")
+            if getattr(self, key) not in (None, ())
+        ]
+        if self.parts and len(said) > 1:
+            raise ValueError(
+                f"{said[0]} cannot stand beside {said[-1]}: a limit state has a response with its "
+                "limit, or any_of, or all_of"
+            )
+        if not said:
+            raise ValueError(
+                "response is missing: a limit state has a response with its limit, or any_of, or "
+                "all_of"
+            )
+        if len(set(self.parts)) < len(self.parts):
+            raise ValueError(f"{said[0]} must not name anything twice, got {', '.join(self.parts)}")
+        if (self.response is None) != (self.limit is None):
+            missing = "limit" if self.limit is None else "response"
+            raise ValueError(f"{missing} is missing: a response needs a limit, a limit a response")
+        if self.response is not None:
+            self._check_limit(RESPONSE_UNITS[self.response])
+        return self
+
+    def _check_limit(self, unit: str) -> None:
+        """Refuse a limit of another unit than the response's, or one that is not positive."""
+        shown = _pint_unit(unit)
+        if isinstance(self.limit, str) and not shown:
+            raise ValueError(
+                f"limit must be a plain number, as {self.response} has no unit, got {self.limit!r}"
+            )
+        if not isinstance(self.limit, str) and shown:
+            raise ValueError(f"limit must carry its unit, such as '{self.limit:g} {shown}'")
+        if not 0 < self.threshold < math.inf:
+            raise ValueError(f"limit must be greater than 0 and finite, got {self.limit!r}")
+
+
+ONCE_A_YEAR = 2.74e-5
+"""Probability per passage of once a year with 36,500 trains, a hundred a day; assumed."""
+
+
+def _limit_states() -> dict[str, LimitState]:
+    """The limit states that are shipped: those whose response there is."""
+    once = "; target: once a year with 36,500 trains, assumed"
+    shipped: tuple[tuple[str, str, str | float, str, str], ...] = (
+        (
+            "suspension gap",
+            "suspension_gap_excursion",
+            "4 mm",
+            "customary for a gap of 8 to 10 mm, recalled; assumed here",
+            "medium",
+        ),
+        (
+            "guidance gap",
+            "guidance_gap_excursion",
+            "4 mm",
+            "as the suspension gap; assumed",
+            "low",
+        ),
+        (
+            "ride",
+            "car_body_acceleration_z",
+            "1.0 m/s^2",
+            "EN 1990:2002/A1, table A2.9, very good comfort, recalled",
+            "medium",
+        ),
+        (
+            "Sperling, vertical",
+            "sperling_index_z",
+            2.5,
+            "GB/T 5599, excellent up to 2.5",
+            "high",
+        ),
+        (
+            "Sperling, lateral",
+            "sperling_index_y",
+            2.5,
+            "GB/T 5599, excellent up to 2.5",
+            "high",
+        ),
+        (
+            "ISO 2631, vertical",
+            "iso2631_rms_z",
+            "0.315 m/s^2",
+            "ISO 2631-1:1997, annex C, not uncomfortable below",
+            "high",
+        ),
+        (
+            "ISO 2631, lateral",
+            "iso2631_rms_y",
+            "0.315 m/s^2",
+            "ISO 2631-1:1997, annex C, not uncomfortable below",
+            "high",
+        ),
+        (
+            "deflection",
+            "deflection_over_span",
+            1 / 4000,
+            "L/4000, customary for high-speed guideways, recalled; assumed here",
+            "low",
+        ),
+        ("dynamic factor", "dynamic_coefficient", 1.2, "assumed", "low"),
+    )
+    return {
+        name: LimitState.model_validate(
+            {
+                "response": response,
+                "limit": limit,
+                "target": ONCE_A_YEAR,
+                "drives": False,
+                "source": f"{source}{once}",
+                "confidence": confidence,
+            }
+        )
+        for name, response, limit, source, confidence in shipped
+        if response in RESPONSES
+    }
+
+
 _RESERVED = ("config", "track", "guideway", "train", "figures", "tables", "checks", "report")
 """Folders beside those of the cases."""
 
 
-class Case(Parameters):
-    """One case: its random gains, their variation, the number of spans and the methods."""
+class Law(Parameters):
+    """Law of one random quantity: mean and deviation, bounds, or a table."""
 
-    n_spans: int = _count(5, "number of spans, in place of guideway.n_spans")
+    law: Literal[
+        "normal",
+        "lognormal",
+        "uniform",
+        "triangular",
+        "truncated_normal",
+        "gumbel",
+        "weibull",
+        "beta",
+        "quantiles",
+        "sample",
+        "discrete",
+    ] = Field("normal", description="name of the law")
+    mean: float | str | None = Field(
+        None, description="mean, with its unit; left out: the configured value"
+    )
+    coefficient_of_variation: float | None = Field(
+        None, description="standard deviation over the mean [-]", gt=0, allow_inf_nan=False
+    )
+    deviation: float | str | None = Field(None, description="standard deviation, with its unit")
+    low: float | str | None = Field(None, description="lower bound, with its unit")
+    high: float | str | None = Field(None, description="upper bound, with its unit")
+    mode: float | str | None = Field(
+        None, description="likeliest value of a triangular law; left out: the configured value"
+    )
+    quantiles: tuple[tuple[float, float | str], ...] | None = Field(
+        None, description="table of [probability, value] from 0 to 1, linear between its rows"
+    )
+    values: tuple[float | str, ...] | None = Field(
+        None, description="values of a discrete law or of a sample, with their units"
+    )
+    probabilities: tuple[float, ...] | None = Field(
+        None, description="probability of each value of a discrete law; left out: all alike"
+    )
+    file: str | None = Field(
+        None,
+        description="CSV file with the values of a sample in its first column, the unit in the "
+        "heading in brackets; path relative to the configuration file",
+        json_schema_extra={"file": True},
+    )
+
+    @field_validator("law", mode="before")
+    @classmethod
+    def _as_one_word(cls, value: Any) -> Any:
+        return value.replace(" ", "_") if isinstance(value, str) else value
+
+    def quantities(self) -> dict[str, Any]:
+        """Return what the law says, as the configuration file would write it."""
+        said = {name: value for name, value in super().quantities().items() if value is not None}
+        return said
+
+
+def _all_gains(variation: float = 0.10, among: tuple[Gain, ...] = GAIN_KEYS) -> dict[str, Law]:
+    """Independent normal gains of one coefficient of variation."""
+    return {f"gains.{gain}": Law(coefficient_of_variation=variation) for gain in among}
+
+
+WHY_NO_DESIGN = (
+    "a surrogate of the random quantities does not know the track of a passage, which decides more "
+    "of its extremes than they do; mcm counts over all tracks"
+)
+"""Reason why no method with a surrogate is carried out where tracks differ."""
+
+
+class Case(Parameters):
+    """One case: what is random in it and how, its own values, and the methods."""
+
+    n_spans: int | None = Field(
+        None, description="number of spans of this case; null: guideway.n_spans", ge=1
+    )
     set: Mapping[str, Any] = Field(
         {},
         description="values of this case alone by the dotted keys of train, guideway, "
         "irregularity, gains, control and passage, such as {control.suspension.group: ends}",
     )
-    coefficient_of_variation: float = Field(
-        0.10,
-        description="standard deviation of each random gain over its mean; normal, independent",
-        gt=0,
-        allow_inf_nan=False,
+    sweep: Mapping[str, tuple[Any, ...]] = Field(
+        {},
+        description="one or two dotted keys with the values that make cases of this one, such as "
+        "{passage.speed: [300 km/h, 400 km/h]}; they are called by its name and a number",
     )
-    random_gains: tuple[Gain, ...] = Field(
-        GAIN_KEYS, description="gains that are random; the others stay at their means", min_length=1
+    random: Mapping[str, Law] = Field(
+        _all_gains(),
+        description="what is random, by its dotted key, and its law; all else has its configured "
+        "value; null makes a key fixed that a file below makes random",
+        json_schema_extra={"names": r"^[a-z_0-9]+(\.[a-z_0-9]+)+$"},
+    )
+    correlation: tuple[tuple[str, str, float], ...] = Field(
+        (),
+        description="linear correlation of pairs of random quantities: [key, key, coefficient]; "
+        "pairs left out are uncorrelated",
+    )
+    track: Literal["fixed", "random"] | int = Field(
+        "fixed",
+        description="fixed: the track of the seed; random: each run has a track of its own; or a "
+        "number of tracks that the runs share in turns",
     )
     methods: tuple[Method, ...] = Field(
         ("asm",), description="methods that the target `all` runs", min_length=1
@@ -1150,55 +1452,202 @@ class Case(Parameters):
     n_samples: int | None = Field(
         None, description="runs of its baseline; null: study.mcm.n_samples", ge=2
     )
-    random_track: bool = Field(
-        False, description="whether each sample has an irregularity of its own (mcm only)"
-    )
 
     def __hash__(self) -> int:
         return hash(repr(self))
 
+    @property
+    def possible_methods(self) -> tuple[Method, ...]:
+        """Methods of the case that can be carried out.
+
+        A surrogate of the random quantities does not know the track of a passage: where tracks
+        differ, only the baseline is left (`WHY_NO_DESIGN`).
+        """
+        fixed = self.track == "fixed"
+        return tuple(name for name in self.methods if fixed or name == "mcm")
+
     @model_validator(mode="before")
     @classmethod
-    def _refuse_correlation(cls, data: Any) -> Any:
-        for key in data if isinstance(data, Mapping) else ():
-            if "correlat" in str(key):
-                raise ValueError(
-                    f"{key} is not supported: the random gains are independent; leave it out"
-                )
-        return data
+    def _refuse_old_keys(cls, data: Any) -> Any:
+        if not isinstance(data, Mapping):
+            return data
+        for old, new in _NEW_FORM.items():
+            if old in data:
+                raise ValueError(f"{old} is no longer a key: write {new}")
+        track = data.get("track", "fixed")
+        if track not in ("fixed", "random") and not (type(track) is int and track >= 2):
+            raise ValueError(
+                f"track must be fixed, random or a number of tracks from 2, got {track!r}"
+            )
+        random = data.get("random")
+        if not isinstance(random, Mapping):
+            return data
+        return {**data, "random": {key: law for key, law in random.items() if law is not None}}
 
     @model_validator(mode="after")
     def _check(self) -> Case:
-        for key, names in (("random_gains", self.random_gains), ("methods", self.methods)):
-            if len(set(names)) < len(names):
-                raise ValueError(f"{key} must not name anything twice, got {', '.join(names)}")
-        if self.random_track and self.methods != ("mcm",):
-            others = ", ".join(name for name in self.methods if name != "mcm")
+        if len(set(self.methods)) < len(self.methods):
+            raise ValueError(f"methods must not name anything twice, got {', '.join(self.methods)}")
+        if not self.random:
             raise ValueError(
-                f"random_track works with the method mcm only, got {others}: a surrogate of the "
-                "gains cannot know the track of each sample"
+                "random must name at least one quantity, such as "
+                "{gains.suspension_proportional: {law: normal, coefficient_of_variation: 0.1}}"
             )
+        if self.n_spans is not None and "guideway.n_spans" in {
+            *self.set,
+            *self.random,
+            *self.sweep,
+        }:
+            raise ValueError("n_spans says what guideway.n_spans says too; leave one of them out")
+        for key in self.random:
+            if key in self.set:
+                raise ValueError(f"{key} is both set and random; leave one of them out")
+        self._check_sweep()
+        self._check_correlation()
         return self
+
+    def _check_sweep(self) -> None:
+        """Refuse a sweep over too many keys, over too few values, or over what is given already."""
+        if len(self.sweep) > 2:
+            raise ValueError(f"sweep takes one or two keys, got {', '.join(self.sweep)}")
+        for key, values in self.sweep.items():
+            for other, given in (("random", self.random), ("set", self.set)):
+                if key in given:
+                    raise ValueError(f"{key} is both swept and {other}; leave one of them out")
+            if len(values) < 2:
+                raise ValueError(f"sweep of {key} needs at least two values, got {len(values)}")
+
+    def settings(self) -> dict[str, dict[str, Any]]:
+        """Values of the swept keys of each case that the sweep makes, by what follows its name."""
+        keys, lists = list(self.sweep), list(self.sweep.values())
+        numbers = product(*(range(len(values)) for values in lists))
+        return {
+            "_".join(str(k + 1) for k in chosen): {
+                key: values[k] for key, values, k in zip(keys, lists, chosen, strict=True)
+            }
+            for chosen in (numbers if keys else ())
+        }
+
+    def _check_correlation(self) -> None:
+        """Refuse pairs that are not two random quantities, and coefficients that cannot be."""
+        seen = set()
+        for one, other, coefficient in self.correlation:
+            for key in (one, other):
+                if key not in self.random:
+                    raise ValueError(
+                        f"correlation: {key} is not random; the random ones are "
+                        f"{', '.join(self.random)}"
+                    )
+            pair = frozenset((one, other))
+            if len(pair) < 2 or pair in seen:
+                raise ValueError(
+                    f"correlation: {one} and {other} must be two quantities, named once"
+                )
+            seen.add(pair)
+            if not abs(coefficient) < 1:
+                raise ValueError(
+                    f"correlation of {one} and {other} must lie between -1 and 1, "
+                    f"got {coefficient:g}"
+                )
+        if seen and min(_eigenvalues(self.correlation_matrix)) <= 0:
+            pairs = ", ".join(f"{one}, {other}: {r:g}" for one, other, r in self.correlation)
+            raise ValueError(
+                "correlation: these coefficients contradict each other, their matrix is not "
+                f"positive definite: {pairs}"
+            )
+
+    @property
+    def correlation_matrix(self) -> tuple[tuple[float, ...], ...]:
+        """Linear correlation of the random quantities, in their order [-]."""
+        keys = list(self.random)
+        rows = [[float(j == k) for k in range(len(keys))] for j in range(len(keys))]
+        for one, other, coefficient in self.correlation:
+            j, k = keys.index(one), keys.index(other)
+            rows[j][k] = rows[k][j] = coefficient
+        return tuple(tuple(row) for row in rows)
+
+
+_NEW_FORM = {
+    "random_gains": "the gains with their laws under random, such as "
+    "random: {gains.suspension_proportional: {law: normal, coefficient_of_variation: 0.1}}",
+    "coefficient_of_variation": "it into the law of each quantity, such as "
+    "random: {gains.suspension_proportional: {law: normal, coefficient_of_variation: 0.1}}",
+    "random_track": "track: random",
+}
+"""What stands in place of keys of earlier versions."""
+
+
+def _eigenvalues(matrix: tuple[tuple[float, ...], ...]) -> list[float]:
+    import numpy as np
+
+    return list(np.linalg.eigvalsh(np.array(matrix)))
 
 
 def _cases() -> dict[str, Case]:
     """The cases of the paper, and those of who shares a circuit and how late its current comes."""
-    cases = {"validation": Case(methods=("mcm", "osm", "asm_paper", "asm"))}
+    cases = {"validation": Case(n_spans=5, methods=("mcm", "osm", "asm_paper", "asm"))}
     for gain in GAIN_KEYS:
-        cases[f"only_{gain}"] = Case(n_spans=20, random_gains=(gain,))
+        cases[f"only_{gain}"] = Case(n_spans=20, random=_all_gains(among=(gain,)))
     cases["all_gains"] = Case(n_spans=20)
     for percent in range(4, 16, 2):
-        cases[f"cov_{percent:03d}"] = Case(coefficient_of_variation=percent / 100)
+        cases[f"cov_{percent:03d}"] = Case(n_spans=5, random=_all_gains(percent / 100))
     for name, key, value in (
         *((f"group_{group}", "group", group) for group in GROUPS if group != "pole"),
         ("lag_2ms", "lag", "2 ms"),
     ):
         cases[name] = Case(
+            n_spans=5,
             set={f"control.{kind}.{key}": value for kind in ("suspension", "guidance")},
             methods=("mcm", "asm"),
             n_samples=2000,
         )
     return cases
+
+
+def _swept(cases: Mapping[str, Any]) -> dict[str, Any]:
+    """Cases that the sweeps among some cases make, as a file would write them."""
+    made: dict[str, Any] = {}
+    for name, case in cases.items():
+        sweep = case.get("sweep") if isinstance(case, Mapping) else None
+        if not isinstance(sweep, Mapping) or not sweep:
+            continue
+        try:
+            settings = Case.model_validate(case).settings()
+        except ValidationError:
+            continue  # said when the case itself is checked
+        plain = {key: value for key, value in case.items() if key != "sweep"}
+        for number, values in settings.items():
+            one = {**plain, "set": {**(case.get("set") or {}), **values}}
+            taken = cases.get(f"{name}_{number}", one)
+            if taken is not None and not isinstance(taken, Case) and dict(taken) != one:
+                made_by = Case.model_validate(one)
+                if Case.model_validate(taken) != made_by:
+                    raise ValueError(
+                        f"cases.{name}.sweep makes a case {name}_{number}, which there is already; "
+                        "give one of them another name"
+                    )
+            made[f"{name}_{number}"] = one
+    return made
+
+
+class PaperFigures(Parameters):
+    """Cases that the numbered figures and tables of the paper compare, in the order of legends."""
+
+    compared: str = Field(
+        "validation", description="case by every method: figures 9 to 12, tables, the line"
+    )
+    by_gain: tuple[str, ...] = Field(
+        (*(f"only_{gain}" for gain in GAIN_KEYS), "all_gains"),
+        description="cases with each gain random alone, and with all: figures 13 and 14",
+    )
+    by_variation: tuple[str, ...] = Field(
+        tuple(f"cov_{percent:03d}" for percent in range(4, 16, 2)),
+        description="cases whose gains vary ever more: figures 15 and 16",
+    )
+    by_control: tuple[str, ...] = Field(
+        ("validation", *(f"group_{group}" for group in GROUPS if group != "pole"), "lag_2ms"),
+        description="cases of who shares a circuit and how late its current comes",
+    )
 
 
 _OF_A_CASE = ("train", "guideway", "irregularity", "gains", "control", "passage")
@@ -1216,15 +1665,47 @@ def _with_value(section: Any, keys: list[str], value: Any) -> Any:
     return section.model_copy(update={first: inner})
 
 
+def _field_at(section: Any, keys: list[str]) -> tuple[FieldInfo, Any]:
+    """Field and value at nested keys of a section.
+
+    Raises
+    ------
+    KeyError
+        With the first key that there is not.
+    """
+    first, *rest = keys
+    if not hasattr(section, "field_named"):
+        raise KeyError(first)
+    field, value = section.field_named(first), getattr(section, first)
+    return _field_at(value, rest) if rest else (field, value)
+
+
+TAIL = 1e-6
+"""Probability of a law that may lie where the model makes no sense [-]; assumed: far below what a
+study with such a law can tell."""
+
+
+def _with_numbers(section: Parameters, nested: Mapping[str, Any], place: str) -> Any:
+    """Copy of a section with other numbers in SI, all of its checks made once."""
+    fields = dict(section.__dict__)
+    for name, value in nested.items():
+        if isinstance(value, Mapping):
+            value = _with_numbers(fields[name], value, f"{place}{name}.")
+        fields[name] = value
+    try:
+        return type(section).model_validate(fields, context=_IN_SI)
+    except ValidationError as error:
+        found = error.errors()[0]
+        why = found["msg"].removeprefix("Value error, ")
+        if not found["loc"]:  # of the section as a whole: the sentence begins with a key of it
+            raise UserError(f"{place}{why}") from None
+        raise UserError(f"{place}{found['loc'][0]}: {why}, got {found['input']!r}") from None
+
+
 BORDER_OF_HALF = {"suspension": 1.246, "guidance": 1.396}
 """Least stable k_p over i0/delta0 where circuits are fed by the mean gap of their half: of one
 linearised car with the default masses and springs (docs/theory/control.md); of the other groups it
-is 1.  Another train has others, so that they serve for a first check only."""
-
-
-def _normal_cdf(u: float) -> float:
-    """Standard normal distribution function."""
-    return 0.5 * math.erfc(-u / math.sqrt(2.0))
+is 1.  Another train has other values; these serve for a first check only."""
 
 
 RAW_CUTOFF, RAW_STEP = 2000.0, 0.06e-3
@@ -1252,6 +1733,16 @@ class Config(Parameters):
     passage: Passage = Passage()
     validation: Validation = Validation()
     study: Study = Study()
+    figures: PaperFigures = PaperFigures()
+    only: tuple[str, ...] | None = Field(
+        None, description="names of the cases that are run, in their order; null: all"
+    )
+    limit_states: Mapping[str, LimitState] = Field(
+        _limit_states(),
+        description="the limit states by name; lost, levitation is lost, is always there; null "
+        "removes one that a file below names",
+        json_schema_extra={"names": r"^\S(.*\S)?$"},
+    )
     cases: Mapping[str, Case] = Field(
         _cases(),
         description="the cases by name; null removes a case that a file below names",
@@ -1269,8 +1760,26 @@ class Config(Parameters):
     def quantities(self) -> dict[str, Any]:
         """Return the class as the configuration file would write it, units included."""
         whole = super().quantities()
-        removed: dict[str, Any] = {name: None for name in _cases() if name not in self.cases}
-        return {**whole, "cases": {**whole["cases"], **removed}}
+        for key, shipped in (("limit_states", _limit_states()), ("cases", _cases())):
+            kept = getattr(self, key)
+            whole[key] |= {name: None for name in shipped if name not in kept}
+        return whole
+
+    @model_validator(mode="before")
+    @classmethod
+    def _arrange_cases(cls, data: Any) -> Any:
+        """Leave the cases away that are not among those of ``only``, and add those of sweeps."""
+        cases = data.get("cases", _cases()) if isinstance(data, Mapping) else None
+        if not isinstance(cases, Mapping) or not cases:
+            return data
+        only = data.get("only")
+        if isinstance(only, list | tuple):
+            for name in only:
+                if cases.get(name) is None:
+                    known = ", ".join(key for key, one in cases.items() if one is not None)
+                    raise ValueError(f"only names '{name}', which is no case; there are: {known}")
+            cases = {name: cases[name] for name in only}
+        return {**data, "cases": {**cases, **_swept(cases)}}
 
     @field_validator("cases", mode="before")
     @classmethod
@@ -1285,41 +1794,198 @@ class Config(Parameters):
                 )
         return {name: case for name, case in cases.items() if case is not None}
 
-    def with_values(self, values: Mapping[str, Any], place: str = "") -> Config:
+    @field_validator("limit_states", mode="before")
+    @classmethod
+    def _drop_removed_states(cls, states: Any) -> Any:
+        if not isinstance(states, Mapping):
+            return states
+        for name in states:
+            if not re.fullmatch(r"\S(.*\S)?", str(name)) or name == LOST:
+                raise ValueError(
+                    f"{name} cannot name a limit state: use a line of text that neither begins nor "
+                    f"ends with a space; {LOST} is always there and means lost levitation"
+                )
+        return {name: state for name, state in states.items() if state is not None}
+
+    @model_validator(mode="after")
+    def _check_limit_states(self) -> Config:
+        known = (*self.limit_states, LOST)
+        for name, state in self.limit_states.items():
+            key = "any_of" if state.any_of else "all_of"
+            for part in state.parts:
+                if part not in known:
+                    raise ValueError(
+                        f"limit_states.{name}.{key} names no limit state: there is no '{part}', "
+                        f"known are: {', '.join(known)}"
+                    )
+        for name in self.limit_states:
+            self._responses_of_state(name)
+        return self
+
+    def _responses_of_state(self, name: str, above: tuple[str, ...] = ()) -> tuple[Response, ...]:
+        """Responses that a limit state and the parts of it limit.
+
+        Raises
+        ------
+        ValueError
+            If it contains itself.
+        """
+        if name in above:
+            circle = " -> ".join((*above[above.index(name) :], name))
+            raise ValueError(f"limit_states.{above[0]} goes in a circle: {circle}")
+        if name == LOST:
+            return ()
+        state = self.limit_states[name]
+        own = () if state.response is None else (state.response,)
+        within = (*above, name)
+        return own + tuple(
+            one for part in state.parts for one in self._responses_of_state(part, within)
+        )
+
+    @property
+    def responses_of_study(self) -> tuple[Response, ...]:
+        """Responses that are predicted: those of the study, then those of the limit states.
+
+        Examples
+        --------
+        >>> Config().responses_of_study[0]
+        'girder_displacement_z'
+        """
+        of_states = (one for name in self.limit_states for one in self._responses_of_state(name))
+        return tuple(dict.fromkeys((*self.study.responses, *of_states)))
+
+    @property
+    def responses_of_designs(self) -> tuple[Response, ...]:
+        """Responses that drive adaptive designs, and that every design reports on."""
+        chosen = self.study.asm.responses
+        if chosen is None:
+            driving = (
+                one
+                for name, state in self.limit_states.items()
+                if state.drives
+                for one in self._responses_of_state(name)
+            )
+            chosen = (*self.study.responses, *driving)
+        return tuple(dict.fromkeys(chosen))
+
+    def with_responses(self) -> Config:
+        """Return the configuration whose study names all responses, its limit states' included."""
+        asm = self.study.asm.model_copy(update={"responses": self.responses_of_designs})
+        study = self.study.model_copy(update={"responses": self.responses_of_study, "asm": asm})
+        return self.model_copy(update={"study": study})
+
+    def with_values(self, values: Mapping[str, Any], prefix: str = "") -> Config:
         """Return the configuration with other values at dotted keys, written as in a file.
 
         Parameters
         ----------
         values
             Such as ``{"passage.speed": "500 km/h"}``.
-        place
-            What the keys belong to, for messages.
+        prefix
+            Text before each key in messages.
 
         Raises
         ------
         UserError
-            If a key is none of a case's, or its value will not do.
+            If a case cannot set the key, or the value is refused.
         """
         changed = self
         for dotted, value in values.items():
             keys = dotted.split(".")
             if keys[0] not in _OF_A_CASE or len(keys) < 2:
                 raise UserError(
-                    f"{place}{dotted} cannot be set for a case alone; the sections that can are "
+                    f"{prefix}{dotted} cannot be set for a case alone; the sections that can are "
                     f"{', '.join(_OF_A_CASE)}, such as passage.speed"
                 )
-            if dotted == "guideway.n_spans":
-                raise UserError(f"{place}{dotted} is the case's n_spans: write it there")
             try:
                 changed = _with_value(changed, keys, value)
             except ValidationError as error:
                 why = error.errors()[0]["msg"].removeprefix("Value error, ")
-                raise UserError(f"{place}{dotted}: {why}") from None
+                raise UserError(f"{prefix}{dotted}: {why}") from None
             except KeyError as error:
                 raise UserError(
-                    f"{place}{dotted} is no key of the configuration: there is no {error.args[0]!r}"
+                    f"{prefix}{dotted} is no key of the configuration: "
+                    f"there is no {error.args[0]!r}"
                 ) from None
         return changed
+
+    def number_at(self, key: str) -> tuple[float, str]:
+        """Return the number at a dotted key, in SI, and its unit.
+
+        Parameters
+        ----------
+        key
+            Such as ``"train.car_body.mass"``.
+
+        Returns
+        -------
+        number, unit
+            The unit in the notation of pint; empty for a count or a pure number.
+
+        Raises
+        ------
+        UserError
+            If there is no such key, or no number at it.
+
+        Examples
+        --------
+        >>> Config().number_at("train.car_body.mass")
+        (39000.0, 'kg')
+        """
+        section: Any = self
+        *outer, last = key.split(".")
+        for name in [*outer, last]:
+            if not isinstance(section, Parameters) or name not in type(section).model_fields:
+                raise UserError(f"{key} is no key of the configuration: there is no {name!r}")
+            parent, section = section, getattr(section, name)
+        if isinstance(section, bool) or not isinstance(section, int | float):
+            raise UserError(f"{key} must be a number to be given in numbers, it is {section!r}")
+        extra = type(parent).model_fields[last].json_schema_extra
+        unit = extra.get("unit") if isinstance(extra, dict) else None
+        return float(section), str(unit or "")
+
+    def with_numbers(self, numbers: Mapping[str, float], place: str = "") -> Config:
+        """Return the configuration with other numbers at dotted keys, in SI.
+
+        The same checks are made as of a file; the cases are left as they are.
+
+        Parameters
+        ----------
+        numbers
+            In SI, such as ``{"passage.speed": 120.0}``.
+        place
+            What they belong to, for messages.
+
+        Raises
+        ------
+        UserError
+            If there is no number at a key, or a number will not do.
+
+        Examples
+        --------
+        >>> Config().with_numbers({"guideway.pier.height": 12.0}).guideway.pier.height
+        12.0
+        """
+        nested: dict[str, Any] = {}
+        for key, number in numbers.items():
+            self.number_at(key)
+            *outer, last = key.split(".")
+            inner = nested
+            for name in outer:
+                inner = inner.setdefault(name, {})
+            inner[last] = number
+        changed = {
+            name: _with_numbers(getattr(self, name), value, f"{place}{name}.")
+            if isinstance(value, Mapping)
+            else value
+            for name, value in nested.items()
+        }
+        config = self.model_copy(update=changed)
+        try:
+            config._check_sections()
+        except ValueError as error:
+            raise UserError(f"{place}{error}") from None
+        return config
 
     def with_case_set(self, name: str) -> Config:
         """Return the configuration in which a case's own values are those of all.
@@ -1344,15 +2010,68 @@ class Config(Parameters):
         if name not in self.cases:
             raise UserError(f"there is no case '{name}', known are: {', '.join(self.cases)}")
         own = self.with_case_set(name)
-        guideway = own.guideway.model_copy(update={"n_spans": own.cases[name].n_spans})
+        n_spans = own.cases[name].n_spans
+        if n_spans is None:
+            return own
+        guideway = own.guideway.model_copy(update={"n_spans": n_spans})
         return own.model_copy(update={"guideway": guideway})
 
-    def statically_stable(self, case: Case) -> float:
+    def unit_of(self, key: str) -> str:
+        """SI unit of a quantity by its dotted key; empty for a pure number.
+
+        Raises
+        ------
+        UserError
+            If the key is none of a case's, or its value is no number.
+        """
+        keys = key.split(".")
+        if keys[0] not in _OF_A_CASE or len(keys) < 2:
+            raise UserError(
+                f"{key} cannot be random; the sections whose numbers can are "
+                f"{', '.join(_OF_A_CASE)}, such as train.car_body.mass"
+            )
+        try:
+            field, value = _field_at(self, keys)
+        except KeyError as error:
+            raise UserError(
+                f"{key} is no key of the configuration: there is no {error.args[0]!r}"
+            ) from None
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise UserError(f"{key} cannot be random: its value is no number, but {value!r}")
+        extra = field.json_schema_extra
+        return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+    def value_of(self, key: str) -> float:
+        """Number at a dotted key, in SI."""
+        return float(_field_at(self, key.split("."))[1])
+
+    def distribution(self, name: str, key: str) -> laws.Distribution:
+        """Distribution of a random quantity of a case, in SI.
+
+        Parameters
+        ----------
+        name
+            Name of the case, whose own values are those of all already.
+        key
+            Dotted key of the quantity.
+
+        Raises
+        ------
+        UserError
+            If the key is no number of the configuration, or there is no such law.
+        """
+        unit = self.unit_of(key)
+        try:
+            return laws.distribution(self.cases[name].random[key], self.value_of(key), unit, key)
+        except ValueError as error:
+            raise UserError(str(error)) from None
+
+    def statically_stable(self, name: str) -> float:
         """Probability that the gains of a case can hold the train statically [-].
 
         A magnet pulls more the closer it is, so its k_p must exceed i₀/δ₀, times `BORDER_OF_HALF`
         for the group ``half``, and its k_d must not be negative.  What lag and delay take away is
-        not in it.
+        not in it; gains count as independent.
 
         References
         ----------
@@ -1367,13 +2086,27 @@ class Config(Parameters):
                 (f"{kind}_proportional", factor * magnet.current_reference / magnet.gap_reference),
                 (f"{kind}_derivative", 0.0),
             ):
-                mean = getattr(self.gains, gain)
-                if gain in case.random_gains:
-                    deviation = case.coefficient_of_variation * mean
-                    probability *= _normal_cdf((mean - least) / deviation)
-                elif mean < least:
+                if f"gains.{gain}" in self.cases[name].random:
+                    of_gain = self.distribution(name, f"gains.{gain}")
+                    probability *= 1.0 - float(of_gain.cdf(least))
+                elif getattr(self.gains, gain) < least:
                     return 0.0
         return probability
+
+    @model_validator(mode="after")
+    def _check_followed(self) -> Config:
+        for name in self.study.in_time.cases:
+            if self.cases and name not in self.cases and name not in _cases():
+                raise ValueError(
+                    f"study.in_time.cases: there is no case '{name}', known are: "
+                    f"{', '.join(self.cases)}"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _check(self) -> Config:
+        self._check_sections()
+        return self
 
     @model_validator(mode="after")
     def _check_cases(self) -> Config:
@@ -1381,29 +2114,73 @@ class Config(Parameters):
             if case.set:
                 own = self.with_case_set(name)
                 type(self).model_validate(own.quantities() | {"cases": {}})
-                own._check_case(name, own.cases[name])
+                own._check_case(name)
             else:
-                self._check_case(name, case)
+                self._check_case(name)
         return self
 
-    def _check_case(self, name: str, case: Case) -> None:
-        """Refuse a case whose gains cannot be random or hardly ever hold the train."""
-        for gain in case.random_gains:
-            if not getattr(self.gains, gain) > 0:
-                raise ValueError(
-                    f"cases.{name}.random_gains: {gain} cannot be random, its mean is zero"
-                )
-        stable = self.statically_stable(case)
+    def _check_case(self, name: str) -> None:
+        """Refuse a case whose laws make no sense or whose gains hardly ever hold the train."""
+        place = f"cases.{name}.random."
+        for key in self.cases[name].random:
+            try:
+                self._check_law(name, key)
+            except UserError as error:
+                raise ValueError(f"{place}{error}") from None
+        stable = self.statically_stable(name)
         if stable < 0.5:
             raise ValueError(
-                f"cases.{name}.coefficient_of_variation = {case.coefficient_of_variation:g} "
-                f"leaves only {100 * stable:.0f} % of the gains statically stable "
-                "(k_p > i0/delta0, more for the group half, k_d >= 0), expected at least half; "
-                "lower it, raise the mean gains or take the case away with null"
+                f"cases.{name}.random leaves only {100 * stable:.0f} % of the gains statically "
+                "stable (k_p > i0/delta0, more for the group half, k_d >= 0), expected at least "
+                "half; lower the variation, raise the mean gains or take the case away with null"
             )
 
-    @model_validator(mode="after")
-    def _check(self) -> Config:
+    def _check_law(self, name: str, key: str) -> None:
+        """Refuse a law with mass where the configuration would be refused."""
+        law = self.distribution(name, key)
+        whole = isinstance(_field_at(self, key.split("."))[1], int)
+        if whole:
+            values = law.values if isinstance(law, laws.Discrete) else ()
+            if not values or any(value != round(value) for value in values):
+                raise UserError(f"{key}: it counts, so that its law must be discrete, of integers")
+        if isinstance(law, laws.Discrete):
+            for value in law.values:
+                why = self._why_not(key, value)
+                if why:
+                    raise UserError(f"{key}: its value {value:g} makes no sense: {why}")
+            return
+        for quantile in (law.ppf, law.isf):
+            why = self._why_not(key, float(quantile(TAIL)))
+            if why:
+                share = self._share_refused(key, quantile)
+                raise UserError(
+                    f"{key}: {100 * share:.2g} % of the law lies where the model makes no sense "
+                    f"({why}); narrow the law, or take one with bounds, such as lognormal or "
+                    "truncated_normal"
+                )
+
+    def _why_not(self, key: str, value: float) -> str:
+        """Why a value will not do; empty if it will."""
+        if key.startswith("gains.") and value > 0:  # nothing else is asked of a gain
+            return ""
+        try:
+            self.with_numbers({key: value})
+        except UserError as error:
+            return str(error).removeprefix(f"{key}: ").replace("Input should be", "it must be")
+        return ""
+
+    def _share_refused(self, key: str, quantile: Callable[[float], Any]) -> float:
+        """Probability, from one end of a law on, of values that will not do."""
+        low, high = TAIL, 1.0
+        for _ in range(30):
+            share = math.sqrt(low * high)
+            low, high = (
+                (share, high) if self._why_not(key, float(quantile(share))) else (low, share)
+            )
+        return low
+
+    def _check_sections(self) -> None:
+        """Refuse sections that do not fit each other."""
         for kind in ("suspension", "guidance"):
             magnet = getattr(self.train, f"{kind}_magnet")
             if not self.passage.gap_contact < magnet.gap_reference < self.passage.gap_lost:
@@ -1435,4 +2212,3 @@ class Config(Parameters):
                 f"irregularity.fade_in must not exceed passage.approach = "
                 f"{self.passage.approach:g} m, got {self.irregularity.fade_in:g} m"
             )
-        return self

@@ -42,6 +42,15 @@ def read(path: str | Path) -> Measured:
     UserError
         If it cannot be read as such, a column is missing, of another length or unit, holds what is
         not a finite number, or x does not rise.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "track.csv"
+    ...     _ = path.write_text("x,vertical,lateral\\n0,0.001,0\\n1,0.002,0\\n")
+    ...     read(path).x
+    array([0., 1.])
     """
     path = Path(path)
     if not path.is_file():

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from maglev import datasets, profiles
-from maglev.arrays import FloatArray
+from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile, profile
-from maglev.mechanics.responses import GIRDER_RESPONSES, Passages, checked_gains
+from maglev.mechanics.responses import (
+    GIRDER_RESPONSES,
+    Passages,
+    checked_gains,
+    in_their_order,
+    responses,
+)
+from maglev.mechanics.varied import checked_values, cost_of, equal_samples
 from maglev.parameters import Config
 
 KEPT_TRACKS = 64
@@ -33,14 +43,17 @@ highest frequency in the band of the responses."""
 def simulate(
     config: Config,
     gains: npt.ArrayLike,
-    histories: bool = False,
+    histories: bool | Literal["responses"] = False,
     solver: Literal["production", "reference"] = "production",
     *,
+    values: Mapping[str, npt.ArrayLike] | None = None,
     track_seeds: npt.ArrayLike | None = None,
     n_threads: int = 1,
     on_progress: Callable[[int], None] | None = None,
 ) -> xr.Dataset:
     """Take the train over the guideway once for every row of gains.
+
+    A sample's numbers do not depend on its neighbours, on their number or on ``n_threads``.
 
     Parameters
     ----------
@@ -50,10 +63,14 @@ def simulate(
         Suspension k_p [A/m], k_d [A s/m], guidance k_p [A/m], k_d [A s/m]; then suspension k_a
         [A s²/m], k_i [A/(m s)], guidance k_a, k_i, those of ``config.gains`` if left out.
     histories
-        Whether to keep the time series of responses, gaps and currents.
+        Whether to keep the time series of responses, gaps and currents; ``"responses"``: without
+        gaps and currents, which are most of their size.
     solver
         ``"production"``: compiled, many samples at once; ``"reference"``: full finite elements with
         a step of its own, halved until the extremes are right to 0.1 %, some thousand times slower.
+    values : key of (sample,)
+        Numbers in SI of each sample in place of those of the configuration, by dotted keys such as
+        ``"train.car_body.mass"``; `cost_of` says what they cost.
     track_seeds : (sample,)
         Seed of each sample's irregularity; ``config.seed`` for all if not given.
     n_threads
@@ -65,24 +82,26 @@ def simulate(
     Returns
     -------
     passages
-        Layout ``passage`` of `maglev.datasets`: on ``sample`` the extremes of the six responses
-        [m, m s-2] and their times [s], gaps [m], currents [A], ``status`` and where and when
-        levitation was lost; with ``histories`` also the time series on ``t``.  The extremes of a
-        lost sample are NaN, as are those of a sample whose gains ask for a smaller step, which is
-        not judged (status ``step_too_large``).  Attributes ``time_step`` [s], ``n_steps`` and
-        ``track``, the words for the track that the numbers are of; of the reference solver also
-        ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
+        Layout ``passage`` of `maglev.datasets`: on ``sample`` the responses of
+        `maglev.vocabulary.RESPONSE_TABLE` and the times of those that have one [s], gaps [m],
+        currents [A], ``status`` and where and when levitation was lost; with ``histories`` also the
+        time series on ``t``.  The responses of a lost sample are NaN, as are those of a sample
+        whose gains ask for a smaller step, which is not judged (status ``step_too_large``).
+        Attributes ``time_step`` [s], ``n_steps``, both the largest of any sample, and ``track``,
+        the words for the track that the numbers are of; of the reference solver also
+        ``estimated_error``, the largest of the six responses of the paper as a share of it, and
+        ``seconds``.
 
     Raises
     ------
     UserError
         If the gains have another shape or are not finite, the time step exceeds the stability
-        limit, the irregularity is shorter than the run, the solver is unknown, or the seeds are
-        not whole numbers from zero, one for each sample of the production solver.
+        limit, the irregularity does not cover the passage, the solver is unknown, the seeds are
+        not whole numbers from zero, one for each sample of the production solver, a value is of no
+        number of the configuration, or will not do for it, or the reference solver does not reach
+        its accuracy.
     FileNotFoundError
         If the irregularity's file does not exist.
-    RuntimeError
-        If the reference solver does not reach its accuracy.
 
     References
     ----------
@@ -102,32 +121,107 @@ def simulate(
     'completed'
     """
     gains = checked_gains(gains, config.gains.further)
+    if histories not in (False, True, "responses"):
+        raise UserError(f"histories must be False, True or 'responses', got {histories!r}")
     if solver not in ("production", "reference"):
         raise UserError(f"solver must be 'production' or 'reference', got {solver!r}")
     seeds = None if track_seeds is None else _checked_seeds(track_seeds, gains.shape[0], solver)
-    every = (
-        max(1, int(HISTORY_INTERVAL / course(config).time_step * (1 + 1e-9))) if histories else 0
-    )
-    if solver == "production":
-        passages = integrate.integrate(
-            _system(config, _track_file_hash(config)),
-            gains,
-            profile_of=None if seeds is None else _tracks_of(config, seeds),
-            record_every=every,
-            n_threads=n_threads,
-            on_progress=on_progress,
+    given = checked_values(config, values or {}, gains.shape[0])
+    groups = _groups(config, given, gains.shape[0], solver)
+    _refuse_unequal_histories(groups, histories)
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(n_threads) as pool:
+        found = list(
+            pool.map(
+                lambda group: _run(
+                    group,
+                    gains,
+                    given,
+                    histories,
+                    solver,
+                    seeds,
+                    n_threads if len(groups) == 1 else 1,
+                    on_progress,
+                ),
+                groups,
+            )
         )
-    else:
+    passages = in_their_order([one for one, _ in found], [group.rows for group in groups])
+    whole = _dataset(groups, gains, passages, histories)
+    whole.attrs["track"] = track_words(config, seeds)
+    if solver == "reference":
+        worst = max((effort for _, effort in found), key=lambda effort: effort["estimated_error"])
+        whole.attrs |= worst | {"seconds": sum(effort["seconds"] for _, effort in found)}
+    return datasets.describe(whole)
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Samples that share a system: their numbers, its configuration, what else each has its own."""
+
+    rows: IntArray
+    config: Config
+    own: tuple[str, ...]
+
+
+def _groups(
+    config: Config, values: Mapping[str, FloatArray], n_samples: int, solver: str
+) -> list[_Group]:
+    """Samples in groups of equal values of what is built anew; all of it for the reference."""
+    cost = cost_of(config, values)
+    built = [key for key in values if cost[key] == "rebuild" or solver == "reference"]
+    built = list(values)
+    own = tuple(key for key in values if key not in built)
+    found = []
+    for rows in equal_samples([values[key] for key in built], n_samples):
+        numbers = {key: float(values[key][rows[0]]) for key in built}
+        place = f"sample {rows[0]}: " if built else ""
+        found.append(_Group(rows, config.with_numbers(numbers, place) if built else config, own))
+    return found
+
+
+def _refuse_unequal_histories(groups: Sequence[_Group], histories: bool | str) -> None:
+    """Refuse histories of samples whose steps or magnets are not the same."""
+    ways = {(course(one.config).time_step, course(one.config).n_steps) for one in groups}
+    trains = {one.config.train.n_cars for one in groups}
+    if histories and (len(ways) > 1 or len(trains) > 1):
+        raise UserError(
+            "histories need the same times and magnets for all samples, but the values change the "
+            "run's length, its step or the number of cars; ask for these samples one by one"
+        )
+
+
+def _run(
+    group: _Group,
+    gains: FloatArray,
+    values: Mapping[str, FloatArray],
+    histories: bool | str,
+    solver: str,
+    seeds: list[int] | None,
+    n_threads: int,
+    on_progress: Callable[[int], None] | None,
+) -> tuple[Passages, dict[str, Any]]:
+    """Passages of a group, and what the reference solver says of its effort."""
+    config, rows = group.config, group.rows
+    if solver == "reference":
         from maglev.mechanics import reference  # seldom needed
 
+        interval = HISTORY_INTERVAL if histories else None
         passages, effort = reference.solve(
-            config, track(config), gains, record_interval=HISTORY_INTERVAL if histories else None
+            config, track(config), gains[rows], record_interval=interval
         )
-    found = _dataset(config, gains, passages, histories)
-    found.attrs["track"] = track_words(config, seeds)
-    if solver == "reference":
-        found.attrs |= effort.attributes
-    return datasets.describe(found)
+        return passages, effort.attributes
+    step = course(config).time_step
+    every = max(1, int(HISTORY_INTERVAL / step * (1 + 1e-9))) if histories else 0
+    passages = integrate.integrate(
+        _system(config, _track_file_hash(config)),
+        gains[rows],
+        profile_of=None if seeds is None else _tracks_of(config, [seeds[k] for k in rows]),
+        record_every=every,
+        with_magnets=histories != "responses",
+        n_threads=n_threads,
+        on_progress=on_progress,
+    )
+    return passages, {}
 
 
 def track(config: Config, seed: int | None = None) -> Profile:
@@ -144,7 +238,7 @@ def track(config: Config, seed: int | None = None) -> Profile:
     Raises
     ------
     UserError, FileNotFoundError
-        If a measured profile cannot be read or is shorter than the run.
+        If a measured profile cannot be read or does not cover the passage.
 
     Examples
     --------
@@ -219,24 +313,17 @@ def _system(config: Config, _track_file: str) -> integrate.System:
     return integrate.prepare(config, track(config))
 
 
-def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: bool) -> xr.Dataset:
-    one, way = ("sample",), course(config)
+def _dataset(
+    groups: Sequence[_Group], gains: FloatArray, passages: Passages, histories: bool | str
+) -> xr.Dataset:
+    one, config = ("sample",), groups[0].config
+    ways = [course(group.config) for group in groups]
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)
     }
-    for k, name in enumerate(GIRDER_RESPONSES):
-        variables[name] = (one, passages.girder[:, k])
-        variables[f"{name}_t"] = (one, passages.girder_time[:, k])
-    cars = np.arange(config.train.n_cars)
-    for axis, extreme, when in (
-        ("z", passages.body_z, passages.body_z_time),
-        ("y", passages.body_y, passages.body_y_time),
-    ):
-        name = f"car_body_acceleration_{axis}"
-        worst = np.where(np.isnan(extreme), -1.0, extreme).argmax(axis=1)[:, None]
-        variables[name] = (one, np.take_along_axis(extreme, worst, axis=1)[:, 0])
-        variables[f"{name}_t"] = (one, np.take_along_axis(when, worst, axis=1)[:, 0])
-        variables[f"{name}_per_car"] = (("sample", "car"), extreme)
+    for name, found in responses(passages).items():
+        for part, values in found.parts.items():
+            variables[f"{name}{part}"] = (one if values.ndim == 1 else ("sample", "car"), values)
     for k, kind in enumerate(("suspension", "guidance")):
         variables[f"{kind}_gap_min"] = (one, passages.gap_min[:, k])
         variables[f"{kind}_gap_max"] = (one, passages.gap_max[:, k])
@@ -244,13 +331,18 @@ def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: b
     variables["status"] = (one, passages.status)
     variables["lost_t"] = (one, passages.lost_time)
     variables["lost_magnet"] = (one, passages.lost_magnet)
-    coordinates: dict[str, npt.NDArray] = {"sample": np.arange(gains.shape[0]), "car": cars}
+    coordinates: dict[str, npt.NDArray] = {
+        "sample": np.arange(gains.shape[0]),
+        "car": np.arange(passages.body_z.shape[1]),
+    }
     if histories:
         for k, name in enumerate(GIRDER_RESPONSES):
             variables[f"{name}_history"] = (("sample", "t"), passages.girder_history[:, k])
         of_car = ("sample", "car", "t")
         variables["car_body_acceleration_z_history"] = (of_car, passages.body_z_history)
         variables["car_body_acceleration_y_history"] = (of_car, passages.body_y_history)
+        coordinates |= {"t": passages.time}
+    if histories and histories != "responses":
         of_magnet = ("sample", "magnet", "t")
         variables["gap_history"] = (of_magnet, passages.gap_history)
         variables["current_history"] = (of_magnet, passages.current_history)
@@ -258,9 +350,12 @@ def _dataset(config: Config, gains: FloatArray, passages: Passages, histories: b
         variables["magnet_kind"] = (("magnet",), magnets.is_guidance.astype(np.int8))
         variables["magnet_side"] = (("magnet",), magnets.side)
         variables["magnet_x"] = (("magnet",), magnets.x)
-        coordinates |= {"magnet": np.arange(magnets.x.size), "t": passages.time}
+        coordinates |= {"magnet": np.arange(magnets.x.size)}
     return xr.Dataset(
         variables,
         coords=coordinates,
-        attrs={"time_step": way.time_step, "n_steps": way.n_steps},
+        attrs={
+            "time_step": max(way.time_step for way in ways),
+            "n_steps": max(way.n_steps for way in ways),
+        },
     )

@@ -21,10 +21,11 @@ from maglev.config import named_files
 from maglev.errors import UserError
 from maglev.fingerprint import code_of, file_hash
 from maglev.parameters import Config, Parameters
-from maglev.vocabulary import BASELINE, METHODS, Method
+from maglev.vocabulary import BASELINE, METHODS, Method, Response
 
 if TYPE_CHECKING:
     import xarray as xr
+    from pydantic.fields import FieldInfo
 
 _FOLDER = Path(__file__).parent / "stages"
 
@@ -41,10 +42,10 @@ class Input:
     layout
         A key of `maglev.datasets.LAYOUTS`.
     by
-        Names that tell several files of the role apart, such as ``("method",)``: the stage is
+        Names that distinguish several files of the role, such as ``("method",)``: the stage is
         then given a mapping by such a name, or by tuples of names.  Empty for one file.
     methods
-        Methods for which a stage of a method is given the role.
+        Methods for which a stage of each method takes the role.
     optional
         Whether the stage also works without the file.
     """
@@ -73,13 +74,13 @@ class Stage:
     layout
         A key of `maglev.datasets.LAYOUTS`: what its file holds.
     compute
-        The function.  It is given the view of the configuration, then by name all of ``takes``
-        and ``inputs`` that there are, and returns the dataset.
+        The function.  It receives the view of the configuration, then by name the given ``takes``
+        and ``inputs``, and returns the dataset.
     takes
-        What it is given besides, with its type: ``case``, ``method``, ``store`` (folder in which
+        Further arguments with their types: ``case``, ``method``, ``store`` (folder in which
         runs are kept), ``n_threads``, or any other name, which is a wildcard of its rule.
     methods
-        Methods for which its file is made; of a stage of a case, of which the case needs one.
+        Methods for which its file is made; for a stage of each case, the case needs one of them.
     table
         From the described dataset to rows and text of a table that is written beside the file as
         CSV and Markdown.
@@ -149,25 +150,28 @@ class Stage:
         config
             The whole configuration.
         case, method
-            Names of the case and the method, where what it reads depends on them.
+            Names of the case and the method, where its keys depend on them.
 
         Returns
         -------
         part
             Of a stage that reads its case: without the other cases, the case's own values in their
-            sections and the guideway with its spans; its methods are the one method.
+            sections and the guideway with its spans; its methods are the one method.  Of a stage
+            that reads responses of the study: those of the limit states among them.
         """
         keys = self.keys(case, method)
         if case is not None and self.reads_of != "run":
             config = config.with_case_set(case)
-        whole = config.quantities()
+        whole = config.with_responses().quantities()
         part = _chosen(whole, keys)
+        if "study" in part and "limit_states" not in part:  # their responses are in the study
+            part["limit_states"] = dict.fromkeys(Config.model_fields["limit_states"].default)
         if self.reads_of != "run":
             assert case is not None  # keys has asked for it
             own = {"methods": [method or BASELINE], **part.get("cases", {}).get(case, {})}
             part["cases"] = {**dict.fromkeys(whole["cases"]), case: own}
             if "guideway" in part:
-                n_spans = whole["cases"][case]["n_spans"]
+                n_spans = whole["cases"][case]["n_spans"] or whole["guideway"]["n_spans"]
                 part["guideway"] = {**part["guideway"], "n_spans": n_spans}
         return part
 
@@ -192,6 +196,7 @@ class Stage:
             raise UserError(f"there is no case '{case}', known are: {', '.join(config.cases)}")
         if case is not None and self.reads_of != "run":
             config = config.with_case_set(case)
+        config = config.with_responses()
         hashes = {name: file_hash(path) for name, path in self.files(config, case, method).items()}
         keys = self.keys(case, method)
         return cast(Config, View(self.name, config, keys, files=tuple(sorted(hashes.items()))))
@@ -215,7 +220,7 @@ class Stage:
         path
             File to write.
         config
-            What it was computed from.
+            Configuration behind the dataset.
         inputs
             Files it was computed from, by their role.
         case, method
@@ -246,8 +251,8 @@ class UndeclaredKeyError(LookupError):
 class View:
     """A section of the configuration restricted to the declared keys of a stage.
 
-    It serves in place of the section: methods and properties of the section see the view.  Two
-    views are equal if all they can be asked for is equal, files that it names by their bytes.
+    It replaces the section: methods and properties of the section see the view.  Two views are
+    equal if all their declared values are equal, and named files by their bytes.
 
     Parameters
     ----------
@@ -257,8 +262,8 @@ class View:
         The configuration or a part of it.
     reads
         Dotted keys inside the section that may be read.
-    place
-        Dotted place of the section in the configuration, with a dot behind it.
+    prefix
+        Dotted key of the section in the configuration, with a dot behind it.
     files
         Hashes of the files that are named in it.
     """
@@ -268,11 +273,11 @@ class View:
         stage: str,
         section: Parameters | Mapping[str, Any],
         reads: tuple[str, ...],
-        place: str = "",
+        prefix: str = "",
         files: tuple[tuple[str, str], ...] = (),
     ) -> None:
         self._stage, self._section, self._reads = stage, section, reads
-        self._place, self._files = place, files
+        self._prefix, self._files = prefix, files
 
     def _read(self, name: str) -> Any:
         section = self._section
@@ -283,10 +288,10 @@ class View:
         inside = tuple(one.removeprefix(prefix) for one in self._reads if one.startswith(prefix))
         if not inside:
             raise UndeclaredKeyError(
-                f"the stage '{self._stage}' reads {self._place}{name}, which it has not declared; "
+                f"the stage '{self._stage}' reads {self._prefix}{name}, which it has not declared; "
                 f"add it to 'reads' of STAGE in maglev/stages/{self._stage}.py"
             )
-        return View(self._stage, value, inside, f"{self._place}{prefix}")
+        return View(self._stage, value, inside, f"{self._prefix}{prefix}")
 
     def __getattr__(self, name: str) -> Any:
         section = self.__dict__.get("_section")
@@ -310,17 +315,44 @@ class View:
     def __contains__(self, name: object) -> bool:
         return name in set(self)
 
+    def field_named(self, name: str) -> FieldInfo:
+        """Field of the section by its name.
+
+        Raises
+        ------
+        KeyError
+            If it has none of that name.
+        """
+        assert isinstance(self._section, Parameters)
+        return self._section.field_named(name)
+
     def model_copy(self, *, update: Mapping[str, Any]) -> View:
         """The same view of a section with other values of some keys, which it must have read."""
         for name in update:
             self._read(name)
         assert isinstance(self._section, Parameters)
         changed = self._section.model_copy(update=update)
-        return View(self._stage, changed, self._reads, self._place, self._files)
+        return View(self._stage, changed, self._reads, self._prefix, self._files)
 
     def with_case_set(self, _name: str) -> View:
-        """The view itself: a case's own values are in their sections since it was made."""
+        """The view itself, in whose sections a case's own values already are."""
         return self
+
+    def with_responses(self) -> View:
+        """The view itself: its study has named all responses since it was made."""
+        return self
+
+    @property
+    def responses_of_study(self) -> tuple[Response, ...]:
+        """Responses that are predicted, as the study of the view names them."""
+        found: tuple[Response, ...] = self.study.responses
+        return found
+
+    @property
+    def responses_of_designs(self) -> tuple[Response, ...]:
+        """Responses that drive adaptive designs, likewise."""
+        found: tuple[Response, ...] = self.study.asm.responses
+        return found
 
     def quantities(self) -> dict[str, Any]:
         """Readable values in the form of a configuration file, units included."""
@@ -350,12 +382,24 @@ def _chosen(whole: Mapping[str, Any], keys: tuple[str, ...]) -> dict[str, Any]:
 
 
 def flag(name: str) -> str:
-    """An option as it stands on the command line, such as ``--threads`` for ``n_threads``."""
+    """An option as it stands on the command line, such as ``--threads`` for ``n_threads``.
+
+    Examples
+    --------
+    >>> flag("n_threads")
+    '--threads'
+    """
     return f"--{name.removeprefix('n_').replace('_', '-')}"
 
 
 def summary(name: str) -> str | None:
-    """First sentence of the module of a stage, read without importing it; None if there is none."""
+    """First sentence of the module of a stage, read without importing it; None if there is none.
+
+    Examples
+    --------
+    >>> summary("passage")
+    'One passage at the mean gains, with its histories.'
+    """
     path = _FOLDER / f"{name}.py"
     tree = ast.parse(path.read_text(encoding="utf-8")) if path.is_file() else ast.Module([], [])
     targets = [each for node in tree.body if isinstance(node, ast.Assign) for each in node.targets]
@@ -365,17 +409,35 @@ def summary(name: str) -> str | None:
 
 
 def summaries() -> dict[str, str]:
-    """Summary of each stage by its name."""
+    """Summary of each stage by its name.
+
+    Examples
+    --------
+    >>> "passage" in summaries()
+    True
+    """
     found = {path.stem: summary(path.stem) for path in sorted(_FOLDER.glob("*.py"))}
     return {name: words for name, words in found.items() if words is not None}
 
 
 def named(name: str) -> Stage:
-    """The stage of a name."""
+    """The stage of a name.
+
+    Examples
+    --------
+    >>> named("passage").layout
+    'passage'
+    """
     stage: Stage = import_module(f"maglev.stages.{name}").STAGE
     return stage
 
 
 def stages() -> dict[str, Stage]:
-    """All stages by their names; imports every module of a stage."""
+    """All stages by their names; imports every module of a stage.
+
+    Examples
+    --------
+    >>> stages().keys() == summaries().keys()
+    True
+    """
     return {name: named(name) for name in summaries()}

@@ -5,9 +5,10 @@ import xarray as xr
 from scipy import stats
 
 from maglev import datasets
-from maglev.datasets import LAYOUTS, VARIABLES
-from maglev.vocabulary import GAINS, RESPONSES
+from maglev.datasets import LAYOUTS
+from maglev.vocabulary import GAIN_KEYS, GAINS, PAPER_RESPONSES
 
+KEYS = tuple(f"gains.{key}" for key in GAIN_KEYS)
 LEVELS = (0.1, 0.01, 0.001)
 MEAN = np.array([3500.0, 17.5, 4500.0, 17.5])
 CENTRE = np.array([1.5e-3, 1e-4, 0.5, 0.3, 0.2, 0.4])
@@ -19,16 +20,21 @@ def _filled(layout, sizes, **given):
     data = dict(given)
     for name in LAYOUTS[layout].variables:
         if name not in data:
-            dims = VARIABLES[name].dims
+            dims = LAYOUTS[layout].variable(name).dims
             data[name] = (dims, np.zeros([sizes[dim] for dim in dims]))
     data = {
-        name: (dims, np.asarray(v).astype(VARIABLES[name].dtype))
+        name: (dims, np.asarray(v).astype(LAYOUTS[layout].variable(name).dtype))
         for name, (dims, v) in data.items()
     }
     coords = {
         dim: np.arange(size)
         for dim, size in sizes.items()
         if any(dim in d for d, _ in data.values())
+    }
+    coords |= {
+        dim: np.array(words)[: sizes[dim]]
+        for dim, words in (("response", PAPER_RESPONSES), ("parameter", KEYS))
+        if dim in coords
     }
     for name in list(data):
         if name in coords:
@@ -49,11 +55,11 @@ def runs(n=400, *, variation=0.1, parameters=(0, 1, 2, 3), seed=1):
     away = gains[:, 0] < 2650.0
     values[away] = np.nan
     given = {name: ("sample", gains[:, k]) for k, name in enumerate(GAINS)}
-    given |= {name: ("sample", values[:, k]) for k, name in enumerate(RESPONSES)}
+    given |= {name: ("sample", values[:, k]) for k, name in enumerate(PAPER_RESPONSES)}
     given |= {
         "standard": (("sample", "parameter"), standard),
         "status": ("sample", np.where(away, 2, 0)),
-        "parameter": ("parameter", np.array(parameters)),
+        "parameter": ("parameter", [KEYS[k] for k in parameters]),
     }
     return _filled("runs", {"sample": n, "car": 1, "parameter": len(parameters)}, **given)
 
@@ -125,7 +131,30 @@ def limits(*, variation=0.1, lost=0.003, n=104):
     return _filled("limits", {"response": 6, "failure_probability": 3}, **given)
 
 
-def accuracy(methods=(1, 2, 3)):
+def limit_states(method="asm", *, lost=0.003, n=104):
+    """Two limits of one response, one of another far away, and both of them together."""
+    names = ["lost", "low", "high", "far", "either"]
+    value = np.array([lost, 0.16, 0.02, lost, 0.16])
+    if method == "asm":
+        value = 1.1 * value
+    given = {
+        "limit_state": ("limit_state", names),
+        "state_response": (
+            "limit_state",
+            ["none", PAPER_RESPONSES[2], PAPER_RESPONSES[2], PAPER_RESPONSES[4], "none"],
+        ),
+        "threshold": ("limit_state", [np.nan, 0.55, 0.6, 5.0, np.nan]),
+        "target": ("limit_state", [np.nan, 0.2, 0.01, 1e-5, np.nan]),
+        "definition": ("limit_state", [f"what {name} says" for name in names]),
+        "n_runs": ((), n),
+    }
+    for prefix, of in (("", value), ("held_", value - lost)):
+        for end, by in (("", 1.0), ("_low", 0.8), ("_high", 1.2)):
+            given[f"{prefix}probability{end}"] = ("limit_state", by * of)
+    return _filled("limit_states", {"limit_state": len(names)}, **given)
+
+
+def accuracy(methods=("osm", "asm_paper", "asm")):
     """Errors that fall with the number of runs."""
     n_runs = np.tile(np.array([8, 12, 16, 24]), (len(methods), 1))
     fall = (2.0 / n_runs**0.5)[:, :, None] * np.ones(6)
@@ -147,11 +176,11 @@ def accuracy(methods=(1, 2, 3)):
     return _filled("accuracy", sizes, **given)
 
 
-def prediction(n=300, methods=(1, 2, 3)):
+def prediction(n=300, methods=("osm", "asm_paper", "asm")):
     """Predictions with an error of a tenth of a deviation."""
     rng = np.random.default_rng(3)
     made = runs(n)
-    computed = np.column_stack([made[name] for name in RESPONSES])
+    computed = np.column_stack([made[name] for name in PAPER_RESPONSES])
     error = 0.1 * WIDTH * rng.standard_normal((len(methods), n, 6))
     away = made["status"].to_numpy() != 0
     given = {
@@ -248,6 +277,41 @@ def line(n=5):
     return _filled("line", sizes, **given).assign_attrs(track=f"{n} tracks")
 
 
+def in_time(n=3):
+    """Responses that swing and spread, n of them, with barriers that are reached half-way."""
+    t, z = np.linspace(0, 3, 61), np.linspace(-5, 5, 41)
+    swing = np.sin(4 * t) * CENTRE[:n, None]
+    width = WIDTH[:n, None] * (0.01 + np.abs(np.sin(t)))
+    by_time, by_level = ("response", "t"), ("response", "failure_probability")
+    shown = ("response", "t", "cell")
+    late = 1 - np.array(LEVELS)[:, None] * (t > 1.5)
+    given = {
+        "response": ("response", np.array(PAPER_RESPONSES[:: 6 // n][:n])),
+        "t": ("t", t),
+        "value_in_time": (shown, swing[..., None] + width[..., None] * z),
+        "density_in_time": (shown, stats.norm.pdf(z) / width[..., None]),
+        "held_in_time": ("t", np.ones(t.size)),
+        "mean_in_time": (by_time, swing),
+        "deviation_in_time": (by_time, width),
+        "quantile_in_time": (
+            (*by_time, "quantile_level"), swing[..., None] + width[..., None] * [-2, 0, 2]
+        ),
+        "quantile_level": ("quantile_level", [0.025, 0.5, 0.975]),
+        "nose": ("t", -100 + 120 * t),
+        "train_length": ((), 124.0),
+        "guideway_length": ((), 124.0),
+        "barrier": (by_level, np.outer(CENTRE[:n], [1.1, 1.2, 1.3])),
+        "reliability": ((*by_level, "t"), np.tile(late, (n, 1, 1))),
+        "reliability_of_points": ((*by_level, "t"), np.tile(late, (n, 1, 1))),
+        "reliability_of_extreme": (by_level, np.tile(1 - np.array([*LEVELS[:2], 0.0]), (n, 1))),
+        "n_runs": ((), 64),
+    }  # fmt: skip
+    sizes = {
+        "response": n, "t": t.size, "cell": z.size, "failure_probability": 3, "quantile_level": 3,
+    }  # fmt: skip
+    return _filled("density_in_time", sizes, **given)
+
+
 def circuits(group="pole", lag="0 s"):
     """Both kinds of magnet with such circuits, as a configuration is written."""
     return {
@@ -264,7 +328,8 @@ def write(
         "demonstration": demonstration,
         "study": {"confidence": 0.95},
         "control": control or circuits(),
-        "cases": {case: {"coefficient_of_variation": variation, "n_spans": 5}},
+        "guideway": {"n_spans": 5},
+        "cases": {case: {"random": {"gains.a": {"coefficient_of_variation": variation}}}},
     }
     attributes = {"case": case} | ({} if method is None else {"method": method})
     datasets.write(dataset.assign_attrs(attributes), path, layout, config=config, code="abc")
@@ -284,6 +349,9 @@ def study(folder, demonstration=False):
         one("density", density("mcm"), method="mcm"),
         one("density", density("osm", shift=0.2), method="osm"),
         one("density", density("asm"), method="asm"),
+    ]
+    states = [
+        one("limit_states", limit_states(method), method=method) for method in ("mcm", "osm", "asm")
     ]
     gains = {"only_a": (0,), "only_b": (3,), "all_gains": (0, 1, 2, 3)}
     of_gain = [
@@ -326,6 +394,7 @@ def study(folder, demonstration=False):
         "prediction": [one("prediction", prediction())],
         "density_by_method": by_method,
         "exceedance_by_method": by_method,
+        "exceedance": [*by_method, *states],
         "density_by_gain": [*by_gain[0], *by_gain[2]],
         "limits_by_gain": [*by_gain[1], *by_gain[2]],
         "density_by_variation": [*by_variation[0], *by_variation[2]],
@@ -339,4 +408,5 @@ def study(folder, demonstration=False):
         "track_split": [one("track_split", track_split())],
         "tracks": [one("line", line())],
         "track_limits": [one("line", line())],
+        "in_time": [one("density_in_time", in_time())],
     }

@@ -1,6 +1,8 @@
 """Figures of the study draw from small files, show what those hold, and refuse what is missing."""
 
 import json
+from importlib import import_module
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -11,7 +13,21 @@ from numpy.testing import assert_allclose
 from test_figures import VALIDATION
 
 from maglev import datasets
-from maglev.figures import FIGURES, curves, draw, labels, layouts_of, stability, style
+from maglev.figures import (
+    FIGURES,
+    curves,
+    density_by_control,
+    draw,
+    exceedance,
+    in_time,
+    labels,
+    layouts_of,
+    limits_by_control,
+    prediction,
+    stability,
+    style,
+)
+from maglev.vocabulary import PAPER_RESPONSES
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +46,70 @@ def test_a_figure_of_the_study_is_drawn_with_its_numbers(tmp_path, files, name):
         for variable in plotted.variables:
             assert "long_name" in plotted[variable].attrs, variable
         assert plotted.attrs["demonstration"] == "no"
+
+
+OF_RESPONSES = [
+    "training", "prediction", "density_by_method", "exceedance_by_method", "exceedance",
+    "density_by_gain", "limits_by_gain", "limits_by_variation", "sobol", "accuracy",
+    "track_split", "tracks", "track_limits",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OF_RESPONSES)
+def test_a_figure_shows_whichever_responses_there_are(files, name):
+    few = [PAPER_RESPONSES[4], PAPER_RESPONSES[1]]
+    layouts = layouts_of(name, len(files[name]))
+    paths, arguments = iter(files[name]), []
+    for entry, group in zip(FIGURES[name], layouts, strict=True):
+        found = [datasets.read(next(paths), layout) for layout in group]
+        found = [one.sel(response=few) if "response" in one.dims else one for one in found]
+        arguments.append(found if entry.endswith("*") else found[0])
+    fig, plotted = import_module(f"maglev.figures.{name}").figure(*arguments)
+    assert plotted["response"].to_numpy().tolist() == few
+    titles = [axis.get_title(loc="left") or axis.get_title() for axis in fig.axes]
+    words = " ".join(titles).replace("\n", " ")
+    assert labels.shown(few[0]).name in words
+    assert labels.shown(PAPER_RESPONSES[0]).name not in words
+
+
+def test_any_number_of_responses_has_panels_in_rows_of_three():
+    names = [*PAPER_RESPONSES, *PAPER_RESPONSES[:2]]
+    data = xr.Dataset(coords={"response": names})
+    fig, panels = labels.response_panels(data, 4.0)
+    assert [number for number, _, _ in panels] == list(range(8))
+    assert len(fig.axes) == 8
+    assert panels[7][1].get_title(loc="left").startswith("(h) ")
+    assert fig.get_figheight() > 4.0
+    assert [labels.lowest(number, data) for number in range(8)] == [False] * 5 + [True] * 3
+
+
+def test_predictions_of_more_responses_than_a_row_holds_go_on_below(files):
+    (data,) = read(files["prediction"], "prediction")
+    more = data.isel(response=[*range(6), 0, 1])
+    fig, _ = prediction.figure(more)
+    panels = [axis for axis in fig.axes if axis.get_xlabel() != "runs in a cell"]
+    assert len(panels) == 3 * 8
+    assert len({axis.get_ylabel() for axis in panels} - {""}) == 3
+    fig.savefig(BytesIO())  # rows stand where they belong
+
+
+def test_limits_stand_on_the_exceedance_with_their_probability(tmp_path, files):
+    draw("exceedance", files["exceedance"], tmp_path / "f")
+    n = len(files["exceedance"]) // 2
+    with xr.open_dataset(tmp_path / "f.nc") as plotted:
+        for number, path in enumerate(files["exceedance"][n:]):
+            one = datasets.read(path, "limit_states")
+            assert_allclose(plotted["curve_state_probability"][number], one["probability"])
+        assert plotted["threshold"].attrs["units_by_limit_state"] == "1, m s-2, m s-2, m s-2, 1"
+    densities = read(files["exceedance"][:n], "density")
+    states = read(files["exceedance"][n:], "limit_states")
+    fig, _ = exceedance.figure(densities, states)
+    words = [[text.get_text() for text in axis.texts] for axis in fig.axes]
+    assert words[2][0] == "low, 0.55 m/s²" and words[2][1] == "MCM P = 16 [12.8, 19.2] %"
+    assert words[4][0] == "far, 5 m/s² →"
+    assert words[0] == words[1] == words[5] == []
+    with pytest.raises(ValueError, match="must be of the same methods"):
+        exceedance.figure(densities, states[::-1])
 
 
 def test_the_same_figure_is_the_same_bytes(tmp_path, files):
@@ -112,6 +192,57 @@ def test_a_range_holds_the_body_and_leaves_out_the_tail(files):
     assert study_files.CENTRE[2] + 2.3 * width < high < study_files.CENTRE[2] + 4.5 * width
 
 
+def second_far_away(paths, layout, variables):
+    """Files of which the second has values that lie 1 m/s² above those of the others."""
+    found = read(paths, layout)
+    for name in variables:
+        found[1][name][:] = found[1][name] + 1.0
+    return found
+
+
+def test_a_density_far_from_all_others_is_noted_and_does_not_squeeze_them(files):
+    paths = files["density_by_control"]
+    n = len(paths) // 2
+    densities = second_far_away(paths[:n], "density", ["value"])
+    far = curves.apart(curves.densities(densities), 2)
+    assert far.tolist() == [k == 1 for k in range(n)]
+    fig, _ = density_by_control.figure(densities, read(paths[n:], "design"))
+    panel = fig.axes[2]
+    assert panel.get_xlim()[1] < study_files.CENTRE[2] + 0.5
+    assert len(panel.get_lines()) == n - 1
+    (note,) = (text.get_text() for text in panel.texts)
+    assert note.startswith("off the panel: 1.")
+
+
+def test_limits_far_from_all_others_are_noted_and_do_not_squeeze_them(files):
+    paths = files["limits_by_control"]
+    n = len(paths) // 2
+    names = [f"{kind}limit{end}" for kind in ("", "held_") for end in ("", "_low", "_high")]
+    limits = second_far_away(paths[:n], "limits", names)
+    fig, _ = limits_by_control.figure(limits, read(paths[n:], "design"))
+    panel = fig.axes[2]
+    assert panel.get_ylim()[1] < study_files.CENTRE[2] + 0.7
+    assert [text.get_text()[:14] for text in panel.texts] == ["off the panel:"]
+
+
+def test_the_shading_of_the_map_ends_at_the_border_that_parts_it(files):
+    border, runs = (
+        datasets.read(path, layout)
+        for path, layout in zip(files["stability"], ("stability", "runs"), strict=True)
+    )
+    x = border["grid_proportional"].to_numpy()
+    middle = 0.5 * (x[3] + x[4])
+    border["growth_rate"][:] = np.where(x < middle, 1.0, -1.0)
+    for parted in (True, False):
+        border["proportional_border"][0] = middle if parted else x[1]
+        border["proportional_border"][1] = np.nan
+        chart = stability.figure(border, runs)[0].axes[0]
+        clips = [one.get_clip_path() for one in chart.collections]
+        ends = [path.get_fully_transformed_path() for path in clips if path is not None]
+        edges = [chart.transData.inverted().transform(end.vertices)[:, 0].max() for end in ends]
+        assert (np.isclose(edges, middle).any()) == parted
+
+
 def test_shares_are_written_with_two_digits():
     assert [labels.percent(one) for one in (0.0, 0.0031, 0.25)] == ["0 %", "0.31 %", "25 %"]
     assert labels.percent(1e-7) == "< 0.001 %"
@@ -146,6 +277,27 @@ def test_a_run_that_was_not_judged_is_marked_and_not_counted_as_lost(files):
         chart.get_legend_handles_labels()[1]
     )
     assert count.get_title(loc="left").startswith("(b) lost 1 of")
+
+
+def test_a_response_in_time_has_three_panels_and_its_errors_are_said(files):
+    data = datasets.read(files["in_time"][0], "density_in_time")
+    data["reliability_error"][:] = -0.004
+    fig, plotted = in_time.figure(data.isel(response=[0]))
+    assert fig.get_size_inches()[0] == style.COLUMN
+    titles = [axis.get_title(loc="left") for axis in fig.axes]
+    assert titles[:3] == [
+        "(a) midspan displacement, vert.",
+        "(b) density about the mean",
+        "(c) failure by first passage, 1 - R(t)",
+    ]
+    words = [text.get_text() for text in fig.axes[2].get_legend().get_texts()]
+    assert words[0] == f"{1.1e3 * study_files.CENTRE[0]:.4g} mm (0.1), error +0.004"
+    # nothing is known of the extreme beyond the last barrier: no circle
+    circles = [line for line in fig.axes[2].get_lines() if line.get_marker() == "o"]
+    assert len(circles) == 2
+    xr.testing.assert_identical(plotted, data.isel(response=[0]))
+    fig, _ = in_time.figure(data)  # the third leaves the place of a fourth empty
+    assert len([axis for axis in fig.axes if axis.get_title(loc="left")]) == 9
 
 
 def test_a_figure_says_of_which_track_its_numbers_are(tmp_path, files):

@@ -13,53 +13,52 @@ from maglev.mechanics import (
     activity,
     guideway,
     integrate,
-    irregularity,
     packing,
     reduction,
 )
 from maglev.mechanics._records import Motion
-from maglev.mechanics.course import course, track_range
+from maglev.mechanics.course import course
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
+from maglev.simulation import track
 
-LINE = Config.model_validate({"train": {"n_cars": 1}, "guideway": {"n_spans": 12}})
-"""One car on twelve spans: most of the line has no train."""
+LONG = Config.model_validate({"train": {"n_cars": 1}, "guideway": {"n_spans": 12}})
+"""One car on twelve spans: most of the guideway has no train."""
 
 
 @lru_cache
-def reduced_line():
-    passage = LINE.passage
+def reduced_guideway():
+    passage = LONG.passage
     return reduction.reduce(
-        guideway.build(LINE.guideway), passage.mode_cutoff, passage.mode_cutoff_elsewhere
+        guideway.build(LONG.guideway), passage.mode_cutoff, passage.mode_cutoff_elsewhere
     )
 
 
 @lru_cache
 def stretches():
-    return activity.stretches(LINE, reduced_line())
+    return activity.stretches(LONG, reduced_guideway())
 
 
 def passed(**constants):
     """Extremes of eight samples, with other constants of the activity."""
-    profile = irregularity.profile(LINE.irregularity, track_range(LINE), LINE.seed)
     spread = 1 + 0.1 * np.random.default_rng(4).standard_normal((8, 4))
     usual = {"QUIET_CUTOFF": activity.QUIET_CUTOFF, "AWAKE_BESIDE": activity.AWAKE_BESIDE}
     with mock.patch.multiple(activity, **(usual | constants)):
-        system = integrate.prepare(LINE, profile)
-        found = integrate.integrate(system, np.array(LINE.gains.as_row) * spread)
+        system = integrate.prepare(LONG, track(LONG))
+        found = integrate.integrate(system, np.array(LONG.gains.as_row) * spread)
     assert not found.status.any()
     return np.column_stack([found.girder, found.body_z, found.body_y, found.gap_min, found.gap_max])
 
 
 def test_quiet_spans_cost_no_accuracy():
-    everywhere = passed(AWAKE_BESIDE=LINE.guideway.n_spans)
+    everywhere = passed(AWAKE_BESIDE=LONG.guideway.n_spans)
     quiet = passed()
     assert np.abs(quiet / everywhere - 1).max() < 3e-3
     assert np.any(quiet != everywhere)
 
 
 def test_the_lower_the_modes_that_quiet_spans_keep_the_larger_the_error():
-    everywhere = passed(AWAKE_BESIDE=LINE.guideway.n_spans)
+    everywhere = passed(AWAKE_BESIDE=LONG.guideway.n_spans)
     errors = [
         np.abs(passed(QUIET_CUTOFF=cutoff) / everywhere - 1).max() for cutoff in (20.0, 100.0)
     ]
@@ -67,21 +66,21 @@ def test_the_lower_the_modes_that_quiet_spans_keep_the_larger_the_error():
 
 
 def test_spans_under_the_train_and_beside_it_are_awake_and_so_is_the_middle_one():
-    length, n_spans = LINE.guideway.span_length, LINE.guideway.n_spans
-    starts = [stretch.first_step for stretch in stretches()] + [course(LINE).n_steps + 1]
+    length, n_spans = LONG.guideway.span_length, LONG.guideway.n_spans
+    starts = [stretch.first_step for stretch in stretches()] + [course(LONG).n_steps + 1]
     assert np.all(np.diff(starts) > 0)
     for stretch, begin, end in zip(stretches(), starts, starts[1:], strict=False):
-        places = course(LINE).nose(np.array([begin, end - 1]) * course(LINE).time_step)
-        tail = int(np.floor((places[0] - LINE.train.length) / length))
+        places = course(LONG).nose(np.array([begin, end - 1]) * course(LONG).time_step)
+        tail = int(np.floor((places[0] - LONG.train.length) / length))
         head = int(np.floor(places[1] / length))
         reach = range(tail - activity.AWAKE_BESIDE, head + activity.AWAKE_BESIDE + 1)
         for span in {*reach, n_spans // 2} & set(range(n_spans)):
-            assert stretch.awake[reduced_line().span_coordinates[span]].all()
+            assert stretch.awake[reduced_guideway().span_coordinates[span]].all()
         assert stretch.stepped[stretch.awake].all()
-        assert stretch.stepped[reduced_line().n_modes :].all()  # pier tops pass motion on
+        assert stretch.stepped[reduced_guideway().n_modes :].all()  # pier tops pass motion on
 
 
-def test_most_of_a_long_line_is_not_stepped():
+def test_most_of_a_long_guideway_is_not_stepped():
     share = np.mean([stretch.stepped.mean() for stretch in stretches()])
     assert share < 0.8
     # Each stretch steps as much as the next, whatever the spans beyond: nothing but ends differ.
@@ -92,15 +91,15 @@ def test_most_of_a_long_line_is_not_stepped():
 def test_the_guideway_rests_until_the_nose_reaches_it():
     first = stretches()[0].first_step
     assert (
-        course(LINE).nose(first * course(LINE).time_step)
+        course(LONG).nose(first * course(LONG).time_step)
         >= 0
-        > course(LINE).nose((first - 1) * course(LINE).time_step)
+        > course(LONG).nose((first - 1) * course(LONG).time_step)
     )
 
 
 def test_tops_that_modes_follow_have_their_mass():
-    """With no mode stepped the tops carry the whole line, as in the finite elements."""
-    reduced = reduced_line()
+    """With no mode stepped the tops carry the whole guideway, as in the finite elements."""
+    reduced = reduced_guideway()
     stepped = np.arange(reduced.n_coordinates) >= reduced.n_modes
     tops, factor = activity.stepped_mass(reduced, stepped, 0.0)
     carried = reduced.carried.toarray()
@@ -110,7 +109,7 @@ def test_tops_that_modes_follow_have_their_mass():
     # A shift sideways moves all mass above the piers, and of the piers less than all.
     sideways = np.zeros(expected.shape[0])
     sideways[1::6] = 1.0
-    model = guideway.build(LINE.guideway)
+    model = guideway.build(LONG.guideway)
     everything = (model.component == 1).astype(float)
     above = everything.copy()
     above[np.concatenate(model.pier_dof)] = 0.0
@@ -159,7 +158,7 @@ def test_what_is_stepped_keeps_the_periods_of_the_guideway():
 
 def test_swings_of_pier_tops_keep_their_period_to_fourth_order():
     """A plain step would be off by (ωΔt)²/24."""
-    reduced, step = reduced_line(), 0.54e-3
+    reduced, step = reduced_guideway(), 0.54e-3
     everything = np.ones(reduced.n_coordinates, dtype=bool)
     tops, factor = activity.stepped_mass(reduced, everything, step)
     at = np.ix_(tops - reduced.n_modes, tops - reduced.n_modes)
@@ -176,13 +175,12 @@ def test_swings_of_pier_tops_keep_their_period_to_fourth_order():
 
 def test_with_all_modes_kept_quiet_spans_change_no_bit():
     kept = passed(QUIET_CUTOFF=1e9)
-    assert_array_equal(kept, passed(AWAKE_BESIDE=LINE.guideway.n_spans))
+    assert_array_equal(kept, passed(AWAKE_BESIDE=LONG.guideway.n_spans))
 
 
 def test_coordinates_that_fall_quiet_are_left_at_rest():
-    profile = irregularity.profile(LINE.irregularity, track_range(LINE), LINE.seed)
-    stretches = integrate.prepare(LINE, profile).spans.stretches
-    n = reduced_line().n_coordinates
+    stretches = integrate.prepare(LONG, track(LONG)).spans.stretches
+    n = reduced_guideway().n_coordinates
     ends = np.flatnonzero(np.diff(stretches.stilled_start))
     assert ends.size > 3
     for stretch in ends:
@@ -191,7 +189,7 @@ def test_coordinates_that_fall_quiet_are_left_at_rest():
         stilled = stretches.stilled[
             stretches.stilled_start[stretch] : stretches.stilled_start[stretch + 1]
         ]
-        assert np.all(stilled < reduced_line().n_modes)
+        assert np.all(stilled < reduced_guideway().n_modes)
         for array in arrays:
             assert not array[stilled].any()
             assert array.sum() == (n - stilled.size) * LANES
@@ -202,9 +200,7 @@ def test_poles_meet_the_joints_half_way_between_steps():
         config = Config.model_validate({"passage": {"speed": speed}})
         advance = config.passage.speed * course(config).time_step
         assert -config.passage.approach - advance < course(config).start <= -config.passage.approach
-        system = integrate.prepare(
-            config, irregularity.profile(config.irregularity, track_range(config), config.seed)
-        )
+        system = integrate.prepare(config, track(config))
         for ground in system.grounds:
             joint = np.abs(ground.x % 3.096)
             assert_allclose(np.minimum(joint, 3.096 - joint).min(), advance / 2, rtol=1e-6)
@@ -220,12 +216,11 @@ def test_the_train_rests_until_it_meets_the_track():
             "passage": {"approach": "40 m"},
         }
     )
-    profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
     gains = np.array([config.gains.as_row])
-    found = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
+    found = integrate.integrate(integrate.prepare(config, track(config)), gains, record_every=7)
     from_the_start = replace(course(config), first_step=1)
     with mock.patch.object(packing, "course", lambda _: from_the_start):
-        whole = integrate.integrate(integrate.prepare(config, profile), gains, record_every=7)
+        whole = integrate.integrate(integrate.prepare(config, track(config)), gains, record_every=7)
     first = course(config).first_step
     assert course(config).nose((first + 1) * course(config).time_step) > -10.0
     assert course(config).nose((first - 1) * course(config).time_step) <= -10.0

@@ -4,7 +4,6 @@ The stored result comes from tests/reference/make_multibody.py; where exudyn is 
 made afresh.
 """
 
-import importlib.util
 import json
 from pathlib import Path
 
@@ -26,11 +25,9 @@ TOLERANCE = 1e-4  # of a frequency or force; the two programs differ by less tha
 @pytest.fixture(scope="module")
 def make_multibody():
     pytest.importorskip("exudyn")
-    path = REFERENCE / "make_multibody.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    import make_multibody
+
+    return make_multibody
 
 
 def closed_matrices(model, gains):

@@ -4,7 +4,6 @@ The stored result comes from tests/reference/make_opensees.py; where openseespy 
 frequencies and static bending are also made afresh.
 """
 
-import importlib.util
 import json
 from pathlib import Path
 
@@ -38,11 +37,9 @@ def make_opensees():
         import openseespy.opensees  # noqa: F401
     except (ImportError, RuntimeError) as error:  # RuntimeError: its system libraries are missing
         pytest.skip(f"openseespy cannot be imported: {error}")
-    path = REFERENCE / "make_opensees.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    import make_opensees
+
+    return make_opensees
 
 
 def dense_row(rows, weight=1.0):

@@ -9,17 +9,17 @@ import scipy.integrate
 from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev.mechanics import integrate, irregularity
-from maglev.mechanics.course import track_range
 from maglev.mechanics.irregularity import displacement, mean_displacement
 from maglev.mechanics.reduction import FaceWeights, face_weights, rail_nodes, rail_weights
 from maglev.parameters import Config, Guideway, Irregularity
+from maglev.simulation import track
 
-LINE = Guideway(n_spans=2)
-SPACING = LINE.span_length / (LINE.rail.units_per_span * LINE.rail.connectors_per_unit)
-UNIT = LINE.span_length / LINE.rail.units_per_span
+GUIDEWAY = Guideway(n_spans=2)
+SPACING = GUIDEWAY.span_length / (GUIDEWAY.rail.units_per_span * GUIDEWAY.rail.connectors_per_unit)
+UNIT = GUIDEWAY.span_length / GUIDEWAY.rail.units_per_span
 NODES = (
-    np.arange(2 * LINE.rail.units_per_span)[:, None] * UNIT
-    + rail_nodes(LINE.rail.connectors_per_unit) * SPACING
+    np.arange(2 * GUIDEWAY.rail.units_per_span)[:, None] * UNIT
+    + rail_nodes(GUIDEWAY.rail.connectors_per_unit) * SPACING
 ).ravel()
 """Places of the nodes of all units [m]; two at every joint."""
 
@@ -45,23 +45,23 @@ def some_motion():
 
 
 def motion_at(x, coefficients, lateral):
-    """Displacement of the rails at places on the line."""
-    span = np.clip(np.floor(x / LINE.span_length), 0, LINE.n_spans - 1).astype(int)
-    first, weight, _ = rail_weights(LINE, x - span * LINE.span_length, lateral=lateral)
-    first = first + span * NODES.size // LINE.n_spans * 2
+    """Displacement of the rails at places on the guideway."""
+    span = np.clip(np.floor(x / GUIDEWAY.span_length), 0, GUIDEWAY.n_spans - 1).astype(int)
+    first, weight, _ = rail_weights(GUIDEWAY, x - span * GUIDEWAY.span_length, lateral=lateral)
+    first = first + span * NODES.size // GUIDEWAY.n_spans * 2
     return (weight * coefficients[first[:, None] + np.arange(4)]).sum(axis=1)
 
 
 def everywhere(length, n=701):
-    """Middles of faces from off the line's beginning to off its end, none just at a node."""
-    return np.linspace(-length - 0.1, LINE.length + length + 0.1, n) + 1e-4 * np.sqrt(2)
+    """Middles of faces from off the guideway's beginning to off its end, none just at a node."""
+    return np.linspace(-length - 0.1, GUIDEWAY.length + length + 0.1, n) + 1e-4 * np.sqrt(2)
 
 
 @LENGTHS
 @KINDS
 def test_faces_see_a_straight_rail_where_it_is_at_their_middle(length, lateral):
-    x = np.linspace(0.5 * length, LINE.length - 0.5 * length, 301)
-    faces = face_weights(LINE, x, length, lateral=lateral)
+    x = np.linspace(0.5 * length, GUIDEWAY.length - 0.5 * length, 301)
+    faces = face_weights(GUIDEWAY, x, length, lateral=lateral)
     ones, line = np.zeros((2, 2 * NODES.size))
     ones[::2] = 1.0
     line[::2], line[1::2] = NODES, SPACING
@@ -78,11 +78,11 @@ def test_the_mean_is_the_integral_of_the_motion_under_the_part_that_is_on_the_gu
 ):
     motion = some_motion()
     x = everywhere(length, 151)
-    found = mean_under(face_weights(LINE, x, length, lateral=lateral), motion)
+    found = mean_under(face_weights(GUIDEWAY, x, length, lateral=lateral), motion)
     gauss, share = np.polynomial.legendre.leggauss(4)
     expected = np.zeros_like(x)
     for k, middle in enumerate(x):
-        near, far = np.clip([middle - 0.5 * length, middle + 0.5 * length], 0, LINE.length)
+        near, far = np.clip([middle - 0.5 * length, middle + 0.5 * length], 0, GUIDEWAY.length)
         cuts = np.unique([near, *NODES[(NODES > near) & (NODES < far)], far])
         for low, high in pairwise(cuts):
             inside = 0.5 * (low + high) + 0.5 * (high - low) * gauss
@@ -96,7 +96,7 @@ def test_the_slope_is_the_derivative_of_the_mean_also_while_joints_pass(length, 
     motion, h = some_motion(), 1e-6
     x = everywhere(length)
     faces, ahead, behind = (
-        face_weights(LINE, x + way, length, lateral=lateral) for way in (0.0, h, -h)
+        face_weights(GUIDEWAY, x + way, length, lateral=lateral) for way in (0.0, h, -h)
     )
     found = mean_under(faces, motion, faces.slope)
     expected = (mean_under(ahead, motion) - mean_under(behind, motion)) / (2 * h)
@@ -109,14 +109,14 @@ def test_the_slope_is_the_derivative_of_the_mean_also_while_joints_pass(length, 
 def test_the_slope_over_an_advance_adds_up_to_what_the_mean_changes_by(length):
     """Wherever in a step the edges meet the joints."""
     motion, advance = some_motion(), 0.0645
-    x = -1.0 + advance * np.arange(round((LINE.length + 2.0) / advance))
-    averaged = face_weights(LINE, x, length, lateral=False, advance=advance)
-    half = face_weights(LINE, np.append(x - 0.5 * advance, x[-1] + 0.5 * advance), length,
+    x = -1.0 + advance * np.arange(round((GUIDEWAY.length + 2.0) / advance))
+    averaged = face_weights(GUIDEWAY, x, length, lateral=False, advance=advance)
+    half = face_weights(GUIDEWAY, np.append(x - 0.5 * advance, x[-1] + 0.5 * advance), length,
                         lateral=False)  # fmt: skip
     change = np.diff(mean_under(half, motion))
     found = mean_under(averaged, motion, averaged.slope) * advance
     assert_allclose(found, change, rtol=0, atol=1e-12 * np.abs(motion).max())
-    weight = mean_under(face_weights(LINE, x, length, lateral=False), motion)
+    weight = mean_under(face_weights(GUIDEWAY, x, length, lateral=False), motion)
     assert_allclose(mean_under(averaged, motion), weight, rtol=0, atol=1e-12)
 
 
@@ -124,22 +124,22 @@ def test_the_slope_over_an_advance_adds_up_to_what_the_mean_changes_by(length):
 def test_a_face_without_length_is_a_point(lateral):
     motion = some_motion()
     x = everywhere(0.1)
-    on = (x > 0) & (x < LINE.length)
-    points = face_weights(LINE, x, 0.0, lateral=lateral, advance=0.06)
+    on = (x > 0) & (x < GUIDEWAY.length)
+    points = face_weights(GUIDEWAY, x, 0.0, lateral=lateral, advance=0.06)
     assert_allclose(mean_under(points, motion)[on], motion_at(x[on], motion, lateral), rtol=1e-12)
     h = 1e-6
     rise = [motion_at(x[on] + way, motion, lateral) for way in (-h, h)]
     slope = mean_under(points, motion, points.slope)[on]
     assert_allclose(slope, (rise[1] - rise[0]) / (2 * h), atol=1e-7 * np.abs(slope).max())
-    short = face_weights(LINE, x, 1e-6, lateral=lateral)
+    short = face_weights(GUIDEWAY, x, 1e-6, lateral=lateral)
     assert_allclose(mean_under(short, motion)[on], mean_under(points, motion)[on], atol=1e-4)
 
 
 @pytest.mark.parametrize("length", [0.0, *FACES])
 def test_faces_off_the_guideway_see_nothing_of_it(length):
     x = everywhere(length)
-    count = np.diff(face_weights(LINE, x, length, lateral=False).start)
-    off = (x + 0.5 * length < 0) | (x - 0.5 * length > LINE.length)
+    count = np.diff(face_weights(GUIDEWAY, x, length, lateral=False).start)
+    off = (x + 0.5 * length < 0) | (x - 0.5 * length > GUIDEWAY.length)
     assert off.sum() > 2
     assert_array_equal(count > 0, ~off)
     assert np.all(count[~off] >= 4)
@@ -196,8 +196,9 @@ def girder_acceleration(speed, pole_length=None, **passage):
         }
         config = config.model_copy(update={"train": config.train.model_copy(update=magnets)})
     config = config.model_copy(update={"passage": config.passage.model_copy(update=passage)})
-    track = irregularity.profile(config.irregularity, track_range(config), config.seed)
-    found = integrate.integrate(integrate.prepare(config, track), np.array([config.gains.as_row]))
+    found = integrate.integrate(
+        integrate.prepare(config, track(config)), np.array([config.gains.as_row])
+    )
     assert not found.status.any()
     return found.girder[0, 2]
 

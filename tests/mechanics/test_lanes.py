@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from maglev.mechanics import _kernels, _rows, integrate, irregularity, packing
-from maglev.mechanics.course import course, track_range
+from maglev.mechanics import _kernels, _rows, integrate, packing
+from maglev.mechanics.course import course
 from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, minimum, store
 from maglev.parameters import Config
+from maglev.simulation import track
 
 RNG = np.random.default_rng(7)
 A, B, C = RNG.normal(size=(3, 4, LANES))
@@ -120,16 +121,16 @@ def test_an_entry_is_that_of_the_array_as_it_lies():
     table = RNG.normal(size=(3, 5))
 
     @numba.njit
-    def read(array, places, out):
-        for k in range(places.size):
-            out[k] = entry(array, places[k])
+    def read(array, indices, out):
+        for k in range(indices.size):
+            out[k] = entry(array, indices[k])
 
-    places, out = np.array([0, 4, 7, 14]), np.zeros(4)
-    read(table, places, out)
-    assert_array_equal(out, table.ravel()[places])
+    indices, out = np.array([0, 4, 7, 14]), np.zeros(4)
+    read(table, indices, out)
+    assert_array_equal(out, table.ravel()[indices])
     if not numba.config.DISABLE_JIT:
         with pytest.raises(numba.core.errors.TypingError, match="entry needs an array in C order"):
-            read(np.asfortranarray(table), places, out)
+            read(np.asfortranarray(table), indices, out)
 
 
 @pytest.mark.parametrize("n_rows", [1, 7, 64])
@@ -181,10 +182,9 @@ def test_a_peak_between_two_steps_is_kept_with_its_time(frequency):
     dt = 0.54e-3
     crest = 40.3 * dt + np.arange(LANES) * dt / LANES  # one for every share of a step
     config = Config()
-    profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
-    system = integrate.prepare(config, profile)
+    system = integrate.prepare(config, track(config))
     kinds = (system.suspension, system.guidance)
-    outcome = packing.empty_outcome(system.train, kinds, packing.run(config, 0))
+    outcome = packing.empty_outcome(system.train, kinds, packing.timing(config, 0))
 
     def motion(step):
         ahead = step * dt - crest
@@ -228,9 +228,8 @@ def short_passage():
     """Extremes and histories of two samples."""
     config = Config.model_validate(SHORT)
     assert course(config).n_steps < 80
-    profile = irregularity.profile(config.irregularity, track_range(config), config.seed)
     gains = np.array(config.gains.as_row) * [[1.0, 1.0, 1.0, 1.0], [1.1, 0.9, 1.2, 0.8]]
-    passages = integrate.integrate(integrate.prepare(config, profile), gains, record_every=1)
+    passages = integrate.integrate(integrate.prepare(config, track(config)), gains, record_every=1)
     assert not passages.status.any()
     names = ("girder", "body_z", "body_y", "gap_min", "gap_max", "current_max",
              "girder_history", "gap_history", "current_history")  # fmt: skip

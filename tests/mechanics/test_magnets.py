@@ -10,14 +10,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
-from maglev.mechanics import _kernels, _magnets, integrate, irregularity, packing
+from maglev.mechanics import _kernels, _magnets, packing
 from maglev.mechanics import train as train_model
-from maglev.mechanics._records import Places
+from maglev.mechanics._records import Footprints
 from maglev.mechanics.control import grouping
-from maglev.mechanics.course import track_range
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.reduction import rail_nodes
 from maglev.parameters import Circuit, Config
+from passages import MEAN, half_size, passed, system_of
 
 CONFIG = Config.model_validate({"train": {"n_cars": 1}, "guideway": {"n_spans": 1}})
 TRAIN = train_model.build(CONFIG.train)
@@ -46,9 +46,9 @@ def first_pair(n_poles=None, *, guidance=False):
 
 
 def over_rigid_track(rows, track, rate):
-    """Places off the guideway, one after the other, the same for all poles (step, side)."""
+    """Footprints off the guideway, one after the other, the same for all poles (step, side)."""
     n_steps = track.shape[0]
-    return Places(
+    return Footprints(
         number=np.zeros((1, rows.offset.size), dtype=np.int64),
         first=np.zeros(n_steps, dtype=np.int64),
         start=np.zeros(n_steps + 1, dtype=np.int64),
@@ -65,7 +65,7 @@ class Stand:
     constant force."""
 
     rows: object
-    places: Places
+    footprints: Footprints
     law: object
     dt: float
     gains: np.ndarray
@@ -79,16 +79,16 @@ class Stand:
         self.magnet = _magnets.empty_magnet(rows, self.law)
         self.circuits = _magnets.circuits_at_rest(rows, self.law)
         self.watch = _kernels._new_watch(2, 1, 1)
-        run = packing.run(CONFIG, 0)
+        timing = packing.timing(CONFIG, 0)
         kinds = (rows, rows)
-        self.outcome = packing.empty_outcome(TRAIN, kinds, run)
+        self.outcome = packing.empty_outcome(TRAIN, kinds, timing)
 
     def close(self, step):
         """Forces at a step, on magnets and rails."""
         for array in (self.train.force, self.rails.force):
             array[:] = 0.0
         _magnets.attract(
-            self.places, self.rows, self.law, step, self.dt, self.gains, self.train, self.rails,
+            self.footprints, self.rows, self.law, step, self.dt, self.gains, self.train, self.rails,
             self.magnet, self.circuits, True, self.watch, self.outcome,
         )  # fmt: skip
 
@@ -105,12 +105,6 @@ class Stand:
 @lru_cache
 def packed_spans():
     return system_of(CONFIG).spans
-
-
-@lru_cache
-def system_of(config):
-    track = irregularity.profile(config.irregularity, track_range(config), config.seed)
-    return integrate.prepare(config, track)
 
 
 def all_lanes(gains):
@@ -312,13 +306,13 @@ def test_poles_that_see_one_gap_pull_alike_however_they_share_circuits(group, gu
 def shaken(system, kind, circuit, step, gains):
     """Magnets of a kind in the middle of a passage, everything moving at random."""
     rng = np.random.default_rng(8)
-    rows, places = (
-        (system.guidance, system.guidance_places)
+    rows, footprints = (
+        (system.guidance, system.guidance_footprints)
         if kind
-        else (system.suspension, system.suspension_places)
+        else (system.suspension, system.suspension_footprints)
     )
     law = packing.law(circuit, rows, 0.5e-3, np.array([gains]))
-    stand = Stand(rows, places, law, 0.5e-3, all_lanes(gains))
+    stand = Stand(rows, footprints, law, 0.5e-3, all_lanes(gains))
     stand.watch = _kernels._new_watch(system.train.magnets.x.size, 1, 1)
     stand.train = _kernels.at_rest(system.vehicle.inverse_mass.size)
     for motion in (stand.train.position, stand.rails.motion):
@@ -333,9 +327,9 @@ def shaken(system, kind, circuit, step, gains):
 def middle_step(system):
     """A step at which the whole train is on the guideway."""
     config = system.config
-    run = packing.run(config, 0)
+    timing = packing.timing(config, 0)
     place = 0.5 * (config.guideway.length + config.train.length)
-    return int((place - run.start) / run.speed / run.time_step)
+    return int((place - timing.start) / timing.speed / timing.time_step)
 
 
 LONG = Config.model_validate({"train": {"n_cars": 1}, "guideway": {"n_spans": 3}})
@@ -352,8 +346,8 @@ def test_train_and_rails_pull_at_each_other_with_one_force_and_one_moment(group,
     rows, rail = stand.rows, LONG.guideway.rail
     on_train = np.zeros(LANES)
     moment = np.zeros(LANES)  # about the first pier
-    run = packing.run(LONG, 0)
-    nose = run.start + run.speed * step * run.time_step
+    timing = packing.timing(LONG, 0)
+    nose = timing.start + timing.speed * step * timing.time_step
     turned = (
         -1.0 if not kind else 1.0
     )  # the arm is the displacement ahead of the centre, or less it
@@ -398,7 +392,7 @@ def gap_rates_and_pulls(stand, step):
     rates, pulls = [], []
     for row, side in np.ndindex(stand.rows.number.shape):
         see_and_pull(
-            stand.places, stand.rows, stand.law, row, side, step, stand.dt, stand.gains,
+            stand.footprints, stand.rows, stand.law, row, side, step, stand.dt, stand.gains,
             stand.train, stand.rails, stand.magnet, stand.circuits,
         )  # fmt: skip
         rates.append(stand.magnet.rate.copy())
@@ -407,44 +401,27 @@ def gap_rates_and_pulls(stand, step):
 
 
 @numba.njit(error_model="numpy")
-def see_and_pull(places, rows, law, row, side, step, dt, gains, train, rails, magnet, circuits):
-    _magnets._look(places, rows, law, row, side, step, train, rails, magnet)
+def see_and_pull(footprints, rows, law, row, side, step, dt, gains, train, rails, magnet, circuits):
+    _magnets._look(footprints, rows, law, row, side, step, train, rails, magnet)
     _magnets._control(rows, law, row, side, step, dt, gains, train, magnet, circuits)
     _magnets._attract(rows, law, row, side, gains, magnet)
 
 
 def small(group="pole", lag="0 ms", delay="0 ms"):
-    """Half a car on half a span."""
+    """Half size, with the same circuits on both kinds of magnet."""
     circuit = {"group": group, "lag": lag, "delay": delay}
-    return Config.model_validate(
-        {
-            "train": {
-                "n_cars": 1,
-                "car_pitch": "12.384 m",
-                "bogie": {"c_frame_spacing": "1.548 m"},
-                "suspension_magnet": {"n_poles": 6, "pole_pitch": "0.258 m"},
-                "guidance_magnet": {"n_poles": 2, "pole_pitch": "0.774 m", "preload": "10 kN"},
-            },
-            "guideway": {"n_spans": 1, "span_length": "12.384 m", "rail": {"units_per_span": 4}},
-            "irregularity": {"fade_in": "5 m"},
-            "passage": {"approach": "5 m", "time_step": "0.25 ms"},
-            "control": {"suspension": circuit, "guidance": circuit},
-        }
+    return half_size(
+        passage={"time_step": "0.25 ms"}, control={"suspension": circuit, "guidance": circuit}
     )
-
-
-def passed(config, gains):
-    return integrate.integrate(system_of(config), np.array(gains, dtype=float), record_every=20)
-
-
-MEAN = np.array(CONFIG.gains.as_row)
 
 
 @pytest.mark.parametrize("late", ["lag", "delay"])
 def test_a_vanishing_lag_or_delay_is_none(late):
-    plain = passed(small(), [MEAN]).gap_history
+    plain = passed(small(), [MEAN], record_every=20).gap_history
     errors = [
-        np.abs(passed(small(**{late: f"{time} ms"}), [MEAN]).gap_history - plain).max()
+        np.abs(
+            passed(small(**{late: f"{time} ms"}), [MEAN], record_every=20).gap_history - plain
+        ).max()
         for time in (0.04, 0.004, 0.0004)
     ]
     assert errors[0] > 1e-9
@@ -457,11 +434,11 @@ def test_a_sample_does_not_know_what_others_feed_back(group, lag, delay):
     """Nor that one of them feeds back the acceleration or an integral."""
     config = small(group, lag, delay)
     own, changes = np.append(MEAN, np.zeros(4)), np.diag([100.0, 1, 1, 1, 0.2, 5e3, 0.2, 5e3])
-    alone = passed(config, [own])
+    alone = passed(config, [own], record_every=20)
     assert not alone.status.any() or group == "half"
     for change in (changes.sum(axis=0), changes[4], changes[5], changes[6]):
         batch = [own + change, own]
-        together = passed(config, batch)
+        together = passed(config, batch, record_every=20)
         for name in ("girder", "body_z", "body_y", "gap_min", "gap_max", "current_max",
                      "status", "gap_history", "current_history", "girder_history"):  # fmt: skip
             mine, theirs = getattr(alone, name)[0], getattr(together, name)[1]

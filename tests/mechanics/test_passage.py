@@ -1,16 +1,15 @@
 """The production solver: what a passage is, against stored passages and independent models."""
 
 import json
-import sys
 from dataclasses import fields
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.signal
 from numpy.testing import assert_allclose, assert_array_equal
 
+import make_passages
 from maglev.mechanics import (
     guideway,
     integrate,
@@ -23,52 +22,24 @@ from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course, track_range
 from maglev.mechanics.lanes import LANES
 from maglev.parameters import Config
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "reference"))
-import make_passages
+from maglev.simulation import track
+from passages import MEAN, TOO_SOFT, half_size, passed, system_of
 
 CONTACT, GAP_LOST = 1, 2
 EXTREMES = ("girder", "body_z", "body_y", "gap_min", "gap_max", "current_max")
 
 
 def small(time_step="0.25 ms", n_spans=1, vertical=2.3e-8, lateral=3.2e-8, **passage):
-    """Half a car in length on half a span, as fast as the real one."""
-    return Config.model_validate(
-        {
-            "train": {
-                "n_cars": 1,
-                "car_pitch": "12.384 m",
-                "bogie": {"c_frame_spacing": "1.548 m"},
-                "suspension_magnet": {"n_poles": 6, "pole_pitch": "0.258 m"},
-                "guidance_magnet": {"n_poles": 2, "pole_pitch": "0.774 m", "preload": "10 kN"},
-            },
-            "guideway": {
-                "n_spans": n_spans,
-                "span_length": "12.384 m",
-                "rail": {"units_per_span": 4},
-            },
-            "irregularity": {
-                "fade_in": passage.get("approach", "5 m"),
-                "vertical": {"law": "power", "coefficient": vertical},
-                "lateral": {"law": "power", "coefficient": lateral, "exponent": 1.6},
-            },
-            "passage": {"approach": "5 m", "time_step": time_step, **passage},
-        }
+    """Half size, with steps, spans and coefficients of the track that tests vary."""
+    return half_size(
+        guideway={"n_spans": n_spans},
+        irregularity={
+            "fade_in": passage.get("approach", "5 m"),
+            "vertical": {"law": "power", "coefficient": vertical},
+            "lateral": {"law": "power", "coefficient": lateral, "exponent": 1.6},
+        },
+        passage={"time_step": time_step, **passage},
     )
-
-
-def profile_of(config):
-    return irregularity.profile(config.irregularity, track_range(config), config.seed)
-
-
-@lru_cache
-def system_of(config):
-    return integrate.prepare(config, profile_of(config))
-
-
-def passed(config, gains=None, **options):
-    gains = [config.gains.as_row] if gains is None else gains
-    return integrate.integrate(system_of(config), np.array(gains), **options)
 
 
 def limit_of(config):
@@ -197,7 +168,7 @@ def closed_linearly(config, duration, step):
     share = train_model.pole_static_force(config.train, magnets)
     k_p, k_d = config.gains.as_row[::2], config.gains.as_row[1::2]
     time = np.arange(round(duration / step) + 1) * step
-    track = profile_of(config)
+    profile = track(config)
     n = train.mass.size
     stiffness, damping = train.stiffness.toarray(), train.damping.toarray()
     push = np.zeros((time.size, n))
@@ -215,7 +186,7 @@ def closed_linearly(config, duration, step):
             stiffness += spring * np.outer(at, at)
             damping += damper * np.outer(at, at)
             place = course(config).nose(time) + magnets.x[m] + dx
-            value, slope = irregularity.displacement(track, place)
+            value, slope = irregularity.displacement(profile, place)
             push += np.outer(spring * value[row] + damper * config.passage.speed * slope[row], at)
     per_mass = np.diag(1 / train.mass)
     state = np.block([[np.zeros((n, n)), np.eye(n)], [-per_mass @ stiffness, -per_mass @ damping]])
@@ -319,10 +290,6 @@ def test_just_below_the_stability_limit_a_passage_stays_finite_and_12_percent_ab
     assert above.status.all()
 
 
-MEAN = np.array(Config().gains.as_row)
-TOO_SOFT = MEAN * [0.6, 1.0, 1.0, 1.0]  # k_p below i0 / gap0 = 2500 A/m: the magnet falls or sticks
-
-
 def test_gains_below_the_static_limit_lose_levitation_and_their_neighbours_do_not_notice():
     among = np.array([MEAN, TOO_SOFT, 1.1 * MEAN])
     config = small(approach="60 m", n_spans=1)
@@ -391,6 +358,6 @@ def test_a_profile_shorter_than_the_run_is_refused():
     config = small()
     start, stop = track_range(config)
     for stretch in ((start, stop - 5.0), (start + 5.0, stop)):
-        track = irregularity.profile(config.irregularity, stretch, config.seed)
+        profile = irregularity.profile(config.irregularity, stretch, config.seed)
         with pytest.raises(ValueError, match=r"^the irregularity must reach from .* m, got .* m$"):
-            integrate.prepare(config, track)
+            integrate.prepare(config, profile)

@@ -18,6 +18,7 @@ import synthetic
 
 from maglev.config import from_mapping
 from maglev.datasets import VARIABLES, describe
+from maglev.parameters import Config
 from maglev.stages import (
     baseline,
     baseline_chunk,
@@ -39,10 +40,10 @@ MAPPING = {
         "asm": {"n_initial": 24, "n_candidates": 512, "n_largest": 36, "batch_size": 4},
     },
     "cases": {
-        "validation": {"coefficient_of_variation": 0.1},
-        "moving": {"methods": ["mcm"], "random_track": True, "n_samples": 6},
+        "moving": {"methods": ["mcm"], "track": "random", "n_samples": 6},
         "same": {"methods": ["asm"]},
     },
+    "limit_states": dict.fromkeys(Config().limit_states),
 }
 
 
@@ -62,11 +63,15 @@ class FormulaTrain:
     def n_runs(self):
         return sum(self.batches)
 
-    def __call__(self, config, gains, *, n_threads=1, track_seeds=None):
+    def __call__(
+        self, config, gains, *, n_threads=1, track_seeds=None, values=None, histories=False
+    ):
         self.batches.append(len(gains))
+        gains = gains[:, : len(GAINS)]
         standard = (gains / np.array(config.gains.as_row) - 1) / 0.1
         made = synthetic.runs(standard, loses=True).drop_vars(
-            ["standard", "probability", "track_seed", "parameter"]
+            ["standard", "parameter_value", "probability", "track_seed", "parameter"],
+            errors="ignore",
         )
         for k, name in enumerate(GAINS):
             made[name] = ("sample", gains[:, k])

@@ -8,7 +8,7 @@ from maglev.datasets import LAYOUTS, VARIABLES, describe
 from maglev.parameters import Config
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import gf_points
-from maglev.vocabulary import DECISIONS, GAINS, RESPONSES
+from maglev.vocabulary import DECISIONS, GAIN_KEYS, GAINS, PAPER_RESPONSES
 
 BORDER = -1.8
 """Gains below it in the first standard coordinate lose levitation."""
@@ -22,9 +22,15 @@ CONFIG = Config.model_validate(
             "n_representative": 200,
             "n_counting": 65536,
             "failure_probability": [0.2, 0.1, 0.01],
-        }
+        },
+        "limit_states": {},
     }
 )
+
+
+def keys(parameters):
+    """Keys of random gains by their numbers."""
+    return [f"gains.{GAIN_KEYS[k]}" for k in parameters]
 
 
 def extremes(u):
@@ -52,11 +58,11 @@ def runs(standard, probability=None, *, loses=False, parameters=(0, 1, 2, 3), va
     for name in (*LAYOUTS["runs"].variables, "track_seed"):
         sizes = {"sample": n, "car": 1, "parameter": standard.shape[1]}
         filled[name] = (VARIABLES[name].dims, np.zeros([sizes[d] for d in VARIABLES[name].dims]))
-    filled |= {name: ("sample", y[:, k]) for k, name in enumerate(RESPONSES)}
+    filled |= {name: ("sample", y[:, k]) for k, name in enumerate(PAPER_RESPONSES)}
     filled["status"] = ("sample", np.where(away, 2, 0))
     filled["standard"] = (("sample", "parameter"), standard)
     filled["probability"] = ("sample", np.full(n, 1 / n) if probability is None else probability)
-    coords = {"sample": np.arange(n), "car": [0], "parameter": list(parameters)}
+    coords = {"sample": np.arange(n), "car": [0], "parameter": keys(parameters)}
     return describe(xr.Dataset(filled, coords=coords))
 
 
@@ -83,7 +89,7 @@ def design(n=60, *, loses=False, seed=6, n_parameters=4, ends=None):
     return describe(
         made.assign(added).assign_coords(
             round=np.arange(len(ends)),
-            response=np.arange(6),
+            response=list(PAPER_RESPONSES),
             failure_probability=list(CONFIG.study.failure_probability),
         )
     )
@@ -97,5 +103,5 @@ def representative(n=200, *, n_parameters=4):
     filled["standard"] = (("sample", "parameter"), points.standard)
     filled["probability"] = ("sample", points.probability)
     filled |= {"discrepancy": ((), points.discrepancy), "counting_error": ((), 0.0)}
-    coords = {"sample": np.arange(n), "parameter": np.arange(n_parameters)}
+    coords = {"sample": np.arange(n), "parameter": keys(range(n_parameters))}
     return describe(xr.Dataset(filled, coords=coords))

@@ -28,8 +28,7 @@ def test_every_sharing_of_circuits_and_a_lag_have_a_case():
 def test_the_first_check_of_a_case_knows_that_circuits_on_a_mean_gap_need_more():
     config = Config()
     plain, half = (
-        config.of_case(name).statically_stable(config.cases[name])
-        for name in ("validation", "group_half")
+        config.of_case(name).statically_stable(name) for name in ("validation", "group_half")
     )
     assert plain > 0.99
     expected = norm.cdf((3500 - 3115) / 350) * norm.cdf((4500 - 3490) / 450)
@@ -45,7 +44,7 @@ def many_lost(n, seed):
     standard = np.random.default_rng(seed).standard_normal((n, 4))
     made = synthetic.runs(standard, loses=True)
     away = is_lost(standard)
-    for name in synthetic.RESPONSES:
+    for name in synthetic.PAPER_RESPONSES:
         made[name] = made[name].where(~away)
     made["status"] = ("sample", np.where(away, 1, 0))
     return describe(made)
@@ -62,7 +61,7 @@ def test_designs_of_which_one_in_seven_is_lost_give_losses_and_limits():
     design = synthetic.design(104)
     away = is_lost(design["standard"].to_numpy())
     assert away.sum() > 8
-    for name in synthetic.RESPONSES:
+    for name in synthetic.PAPER_RESPONSES:
         design[name] = design[name].where(~away)
     design["status"] = ("sample", np.where(away, 1, 0))
     fitted = describe(surrogate.dataset(CONFIG, "asm", design))

@@ -12,7 +12,11 @@ from maglev.datasets import LAYOUTS
 from maglev.stage import Stage, UndeclaredKeyError, flag, named, summaries
 from maglev.stages import stability
 from maglev.stages.points import n_samples
-from maglev.vocabulary import BASELINE, TRACK_PARTS
+from maglev.vocabulary import BASELINE, GAIN_KEYS, TRACK_PARTS
+
+NARROW = {
+    f"gains.{gain}": {"law": "normal", "coefficient_of_variation": 0.02} for gain in GAIN_KEYS
+}
 
 MAPPING = {
     "train": {"n_cars": 1},
@@ -31,13 +35,13 @@ MAPPING = {
         "tracks": {"n_tracks": 3, "n_gains": 16},
     },
     "cases": {
-        "validation": {"n_spans": 1, "coefficient_of_variation": 0.02},
+        "validation": {"n_spans": 1, "random": NARROW},
         "moving": {
             "n_spans": 1,
             "methods": [BASELINE],
-            "random_track": True,
+            "track": "random",
             "n_samples": 8,
-            "coefficient_of_variation": 0.02,
+            "random": NARROW,
         },
     },
 }

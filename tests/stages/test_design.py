@@ -14,11 +14,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from maglev import datasets
 from maglev.stages import design
-from maglev.vocabulary import DECISIONS, RESPONSES
+from maglev.vocabulary import DECISIONS, PAPER_RESPONSES
 
 
 def values(dataset):
-    return np.stack([dataset[name].values for name in RESPONSES], axis=1)
+    return np.stack([dataset[name].values for name in PAPER_RESPONSES], axis=1)
 
 
 def test_a_killed_design_resumes_to_the_same_bytes(tmp_path):

@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 
 from maglev import datasets, simulate, vocabulary
 from maglev.config import from_mapping
-from maglev.stages import baseline, baseline_chunk, baseline_points, points, track_runs
+from maglev.stages import baseline, baseline_chunk, baseline_points, track_runs
 from maglev.stages.runs import stored_runs
 
 
@@ -32,7 +32,9 @@ def test_a_stored_run_is_the_run_itself(tmp_path):
 
 def test_what_is_stored_is_not_computed_again(train, tmp_path):
     parameters = config()
-    gains = points.gains_at(parameters, "validation", np.random.default_rng(1).normal(size=(20, 4)))
+    gains = np.array(parameters.gains.as_row) * np.random.default_rng(1).normal(
+        1, 0.1, size=(20, 4)
+    )
     first = stored_runs(parameters, gains, tmp_path)
     assert train.batches == [8, 8, 4]
     again = stored_runs(parameters, gains[::-1], tmp_path)
@@ -142,7 +144,7 @@ def test_what_cannot_be_run_is_refused(train, tmp_path):
         stored_runs(config(), np.empty((0, 4)), tmp_path)
     with pytest.raises(ValueError, match=r"track_seeds have shape \(2,\), expected \(sample,\)"):
         stored_runs(config(), np.ones((1, 4)), tmp_path, track_seeds=[1, 2])
-    with pytest.raises(ValueError, match=r"cases\.validation\.random_track must be true"):
+    with pytest.raises(ValueError, match=r"cases\.validation\.track must be random"):
         track_runs.dataset(config(), "validation", "track_only", tmp_path)
     with pytest.raises(ValueError, match="part must be one of gains_only, track_only"):
         track_runs.dataset(config(), "moving", "both", tmp_path)

@@ -20,7 +20,7 @@ from maglev.stages import (
     tables,
     track_split,
 )
-from maglev.vocabulary import DENSITY_METHODS, LIMIT_STATUS, METHODS, RESPONSES
+from maglev.vocabulary import DENSITY_METHODS, LIMIT_STATUS, METHODS, PAPER_RESPONSES
 
 LEVELS = np.array(CONFIG.study.failure_probability)
 
@@ -57,7 +57,7 @@ def test_files_are_what_their_layout_says(held, losing, name):
 
 def test_a_later_stage_predicts_what_the_surrogate_was(held):
     again = surrogate.stored_predictor(CONFIG, held["design"], held["surrogate"])
-    first = surrogate.predictor(CONFIG, held["design"], "best")
+    first = surrogate.predictor(CONFIG, held["design"], "best", PAPER_RESPONSES)
     points = np.random.default_rng(1).standard_normal((50, 4))
     assert_array_equal(again.surrogate.predict(points), first.surrogate.predict(points))
 
@@ -158,7 +158,7 @@ def test_a_baseline_has_counted_limits_and_no_gdee():
     check(describe(shown), "density")
     n_lost = int((runs["standard"][:, 0] < BORDER).sum())
     assert_allclose(found["lost_probability"], n_lost / 3000)
-    ranked = np.sort(np.where(runs["status"] == 0, runs[RESPONSES[0]], np.inf))
+    ranked = np.sort(np.where(runs["status"] == 0, runs[PAPER_RESPONSES[0]], np.inf))
     assert found["limit"][0, 1] == ranked[3000 - 300 - 1]
     assert np.isnan(shown["density"]).all() and np.isnan(shown["peak"]).all()
     assert (shown["density_method"] == DENSITY_METHODS.index("direct")).all()
@@ -202,7 +202,7 @@ def test_accuracy_of_a_method_whose_surrogate_is_exact_is_that_of_the_baseline()
     }
     found = accuracy.dataset(CONFIG, runs, designs)
     check(describe(found), "accuracy")
-    assert_array_equal(found["method"], [1, 3])
+    assert found["method"].to_numpy().tolist() == ["osm", "asm"]
     assert_array_equal(found["step_n_runs"][1, :3], [40, 48, 60])
     assert found["step_n_runs"][0, 0] == 40 and found["step_n_runs"][0].max() == 60
     assert (found["step_n_runs"][1, 3:] == 0).all()
@@ -287,10 +287,10 @@ def test_the_check_tells_a_good_method_from_a_bad_one(by_method):
     pairs = {("here", method): one for method, one in found.items()}
     made = describe(statistics_check.dataset(CONFIG, {"here": runs}, pairs))
     check(made, "statistics_check")
-    assert made["check_case"].attrs["flag_meanings"] == "here"
+    assert set(made["check_case"].to_numpy()) == {"here"}
 
     def verdicts(kind, method):
-        chosen = (made["check_kind"] == kind) & (made["check_method"] == METHODS.index(method))
+        chosen = (made["check_kind"] == kind) & (made["check_method"] == method)
         return made["check_passed"].to_numpy()[chosen]
 
     yes, no = statistics_check.YES, statistics_check.NO

@@ -14,6 +14,7 @@ from maglev.datasets import check, describe
 from maglev.stages import line, tables, tracks
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import sobol_points
+from maglev.vocabulary import PAPER_RESPONSES
 
 SMALL = config(tracks={"n_tracks": 3, "n_gains": 16})
 
@@ -58,7 +59,11 @@ def made(n_tracks=12, n_gains=64, loses=False):
             "extreme": (("track", "sample", "response"), extreme),
             "status_on_track": (("track", "sample"), np.tile(np.where(away, 1, 0), (n_tracks, 1))),
         },
-        coords={"parameter": np.arange(4), "track": np.arange(n_tracks)},
+        coords={
+            "parameter": synthetic.keys(range(4)),
+            "track": np.arange(n_tracks),
+            "response": list(PAPER_RESPONSES),
+        },
     )
 
 

@@ -179,7 +179,7 @@ def test_faulty_options_are_refused():
             evolved_density(values, **options)
     with pytest.raises(ValueError, match="bandwidth must be positive"):
         direct_density([1.0], values, bandwidth=-1.0)
-    with pytest.raises(ValueError, match="places must be finite"):
+    with pytest.raises(ValueError, match="values must be finite and have shape"):
         direct_density([np.nan], values)
 
 

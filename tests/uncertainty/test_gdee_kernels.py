@@ -8,7 +8,16 @@ from hypothesis.extra import numpy as hnp
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from maglev.uncertainty._kernels import MINMOD, SUPERBEE, UPWIND, evolve, limited_jump, tvd_step
+from maglev.uncertainty._kernels import (
+    MINMOD,
+    SUPERBEE,
+    UPWIND,
+    advance,
+    evolve,
+    evolve_in_time,
+    limited_jump,
+    tvd_step,
+)
 
 LIMITERS = (UPWIND, MINMOD, SUPERBEE)
 DENSITIES = hnp.arrays(float, 24, elements=st.floats(0.0, 10.0))
@@ -74,16 +83,16 @@ def test_order_is_two_where_the_density_is_smooth_and_monotone(limiter):
     assert 1.8 < order < 2.3
 
 
-def evolved(courant, start, target, limiter, n_cells=160, substeps=1, lower=0, upper=160):
-    total, survival = np.zeros(n_cells), np.zeros(courant.shape[1] + 1)
-    spread = np.zeros(len(courant))
-    probability = np.full(len(courant), 1.0 / len(courant))
+def evolved(increment, start, target, limiter, n_cells=160, lower=0, upper=160):
+    total, survival = np.zeros(n_cells), np.zeros(increment.shape[1] + 1)
+    spread = np.zeros(len(increment))
+    probability = np.full(len(increment), 1.0 / len(increment))
     evolve(
-        courant,
-        substeps,
+        increment,
         np.asarray(start, dtype=float),
         np.asarray(target, dtype=float),
         probability,
+        np.full(len(increment), increment.shape[1]),
         limiter,
         lower,
         upper,
@@ -120,10 +129,40 @@ def test_fractional_start_keeps_its_place_in_the_mean():
     assert_allclose(spread, 0.25 * 0.75)
 
 
-def test_substeps_repeat_the_same_increment():
-    once = evolved(np.full((1, 12), 0.4), [40.0], [44.8], SUPERBEE)[0]
-    grouped = evolved(np.full((1, 4), 0.4), [40.0], [44.8], SUPERBEE, substeps=3)[0]
-    assert_allclose(grouped, once, atol=1e-15)
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("limiter", LIMITERS)
+def test_whole_cells_are_gone_exactly_and_the_rest_by_one_step(limiter, sign):
+    start, rest = np.array([0.1, 0.2, 0.4, 0.2, 0.1]), 0.3 * sign
+    density, stepped = np.zeros((2, 40))
+    for whole in (2, 9):  # less and more than the mass is wide
+        density[:] = stepped[:] = 0.0
+        density[18:23] = stepped[18 + sign * whole : 23 + sign * whole] = start
+        tvd_step(stepped, rest, limiter, 17 + sign * whole, 23 + sign * whole)
+        first, last, absorbed = advance(density, sign * whole + rest, limiter, 0, 40, 18, 22)
+        assert_allclose(density, stepped, rtol=0, atol=1e-15)
+        assert density[first] * density[last] > 0.0
+        assert not absorbed
+
+
+def test_points_leave_nothing_behind_for_one_another():
+    slow, fast = np.full((1, 6), 0.3), np.full((1, 6), -2.7)
+    alone = evolved(slow, [40.0], [41.8], SUPERBEE)[0]
+    together = evolved(np.vstack([fast, slow]), [60.0, 40.0], [43.8, 41.8], SUPERBEE)[0]
+    apart = evolved(fast, [60.0], [43.8], SUPERBEE)[0]
+    assert_allclose(together, 0.5 * (alone + apart), rtol=0, atol=1e-16)
+
+
+def test_a_history_shows_where_its_mass_is_at_every_time():
+    place = np.array([[40.0, 43.0, 41.0], [50.0, 50.0, 56.0]])
+    total, square = np.zeros((3, 100)), np.zeros(3)
+    shares, until = np.array([0.25, 0.75]), np.array([2, 1])
+    evolve_in_time(place, shares, until, SUPERBEE, np.zeros(100), total, square)
+    # whole cells at Courant one are exact; the second point is gone after the second time
+    for row, expected in zip(
+        total, ({40: 0.25, 50: 0.75}, {43: 0.25, 50: 0.75}, {41: 0.25}), strict=True
+    ):
+        assert dict(zip(np.flatnonzero(row).tolist(), row[row > 0], strict=True)) == expected
+    assert_allclose(square, 0.0, atol=0)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -136,6 +175,14 @@ def test_mass_past_a_barrier_is_removed_and_does_not_return(sign):
     assert np.all(np.diff(survival) <= 1e-15)
     total, survival, _ = evolved(-there_and_back, [50.0], [50.0], SUPERBEE, **barrier)
     assert_allclose(survival[-1], 1.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_one_interval_far_beyond_a_barrier_takes_all(sign):
+    increments = np.array([[sign * 3.5, sign * 500.5, -sign * 500.5]])
+    total, survival, _ = evolved(increments, [80.0], [80.0], SUPERBEE, lower=60, upper=101)
+    assert_allclose(survival, [1.0, 1.0, 0.0, 0.0])
+    assert_allclose(total, 0.0)
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -3,12 +3,27 @@
 
 
 STORE = f"results/.store/{config['run']}"
-TABLE_CASE = "validation"
+TABLE_CASE = parameters.figures.compared
+
+
+# a case with a sweep stands for those that the sweep makes
+SWEEPS = [case for case in parameters.cases if parameters.cases[case].sweep]
+CASES = [case for case in parameters.cases if case not in SWEEPS]
+
+
+for case in CASES:
+    refused = [
+        method
+        for method in parameters.cases[case].methods
+        if method not in parameters.cases[case].possible_methods
+    ]
+    if refused:
+        logger.warning(f"cases.{case}: without {', '.join(refused)}: {WHY_NO_DESIGN}")
 
 
 def methods_of(case: str, among: tuple[str, ...] = METHODS) -> list[str]:
     """Methods that a case names, of some."""
-    named = parameters.cases[case].methods if case in parameters.cases else ()
+    named = parameters.cases[case].possible_methods if case in CASES else ()
     return [one for one in among if one in named]
 
 
@@ -16,24 +31,26 @@ def checked_cases(every: bool) -> list[str]:
     """Cases whose statistics can be checked: with a baseline of their own, or all."""
     return [
         case
-        for case in parameters.cases
-        if not parameters.cases[case].random_track
+        for case in CASES
+        if parameters.cases[case].track == "fixed"
         and (every or BASELINE in methods_of(case))
     ]
 
 
-# cases of who shares a circuit and how late its current comes, beside the case of the tables
+def named_cases(names: tuple[str, ...]) -> list[str]:
+    """Those of some cases that there are."""
+    return [case for case in names if case in CASES]
+
+
 CONTROL_CASES = [
     case
-    for case in parameters.cases
-    if case.startswith(("group_", "lag_", "delay_")) and methods_of(case, DESIGNED)
+    for case in named_cases(parameters.figures.by_control)
+    if methods_of(case, DESIGNED)
 ]
-if CONTROL_CASES and methods_of(TABLE_CASE, DESIGNED):
-    CONTROL_CASES.insert(0, TABLE_CASE)
 
 
-def place(stage: str, **names: str) -> str:
-    """Where a file of a stage lies, for such names of its wildcards."""
+def file_of(stage: str, **names: str) -> str:
+    """Path of the file of a stage, for such names of its wildcards."""
     return f"<results>/{FILES[stage]}".format(**names)
 
 
@@ -65,6 +82,8 @@ def chunks(case: str) -> list[dict[str, str]]:
 def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str, str]]:
     """Names of the files of a role that has many."""
     case, every = case_of(wildcards), wildcards.get("scope") == "statistics_truth"
+    if stage.name == "density_in_time":  # barriers are the limits of the best method
+        return [{"method": methods_of(case, DESIGNED)[-1]}]
     if stage.name == "control_study":
         return [
             {"case": one, "method": method} if "method" in by else {"case": one}
@@ -74,6 +93,12 @@ def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str,
                 if "method" in by
                 else methods_of(one, (BASELINE,))
             )
+        ]
+    if stage.name == "limit_state_table":
+        return [
+            {"case": one, "method": method}
+            for one in parameters.cases
+            for method in methods_of(one)
         ]
     return {
         ("method",): lambda: [
@@ -90,7 +115,7 @@ def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str,
     }[by]()
 
 
-def places_of(stage, wildcards) -> dict[str, list[tuple[dict[str, str], str]]]:
+def files_of(stage, wildcards) -> dict[str, list[tuple[dict[str, str], str]]]:
     """Files of every role of a stage, each with its names."""
     found = {}
     own = {"case": case_of(wildcards), "method": wildcards.get("method")}
@@ -101,7 +126,7 @@ def places_of(stage, wildcards) -> dict[str, list[tuple[dict[str, str], str]]]:
             continue
         else:
             names = [{}]
-        found[role] = [(each, place(role, **{**own, **each})) for each in names]
+        found[role] = [(each, file_of(role, **{**own, **each})) for each in names]
     return found
 
 
@@ -111,8 +136,8 @@ def inputs_of(stage):
     def found(wildcards) -> dict[str, str | list[str]]:
         of = {"case": case_of(wildcards), "method": wildcards.get("method")}
         files = {
-            role: [path for _, path in places]
-            for role, places in places_of(stage, wildcards).items()
+            role: [path for _, path in paths]
+            for role, paths in files_of(stage, wildcards).items()
         }
         named = stage.files(parameters, **of)
         return {"config": config_of(stage, **of), **named, **files}
@@ -125,13 +150,13 @@ def options_of(stage):
 
     def written(wildcards, input) -> str:
         given = {"case": case_of(wildcards), "store": STORE, **dict(wildcards.items())}
-        places = places_of(stage, wildcards)
+        files = files_of(stage, wildcards)
         words = []
         for option in stage.options:
             if option == "config":
                 words += [flag(option), input.config]
-            elif option in places:
-                for (names, _), path in zip(places[option], input[option], strict=True):
+            elif option in files:
+                for (names, _), path in zip(files[option], input[option], strict=True):
                     words += [flag(option), *names.values(), path]
             elif option in given:
                 words += [flag(option), given[option]]

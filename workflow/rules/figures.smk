@@ -5,29 +5,29 @@ DRAWN = {
     "fig7": (
         "irregularity",
         "track irregularity and its spectra",
-        [place("irregularity")],
+        [file_of("irregularity")],
     ),
     "fig8": (
         "deflection",
         "midspan deflection and dynamic coefficient",
-        [place("deflection"), place("dynamic_factor")],
+        [file_of("deflection"), file_of("dynamic_factor")],
     ),
-    "histories": ("histories", "histories of the six responses", [place("passage")]),
-    "gaps": ("gaps", "gaps and currents of the magnets", [place("passage")]),
+    "histories": ("histories", "histories of the six responses", [file_of("passage")]),
+    "gaps": ("gaps", "gaps and currents of the magnets", [file_of("passage")]),
     "modes": (
         "modes",
         "modes and frequencies of the guideway",
-        [place("guideway_modes")],
+        [file_of("guideway_modes")],
     ),
     "fig_stiffness": (
         "stiffness_check",
         "static deflection against frequency, whatever the stiffness",
-        [place("stiffness_check")],
+        [file_of("stiffness_check")],
     ),
     "fig_train_modes": (
         "train_modes",
         "frequencies and damping of the train's modes",
-        [place("train_modes")],
+        [file_of("train_modes")],
     ),
     "fig9": (
         "training",
@@ -91,7 +91,7 @@ DRAWN = {
     "fig_stability": (
         "stability",
         "which gains of the suspension hold the train",
-        of_baseline("baseline") and [place("stability"), *of_baseline("baseline")],
+        of_baseline("baseline") and [file_of("stability"), *of_baseline("baseline")],
     ),
     "fig_accuracy": (
         "accuracy",
@@ -116,8 +116,16 @@ DRAWN = {
     "fig_track_split": (
         "track_split",
         "what random gains and a random track contribute",
-        [place("track_split", case=case) for case in TRACK_CASES[:1]],
+        [file_of("track_split", case=case) for case in TRACK_CASES[:1]],
     ),
+    **{
+        f"fig_in_time{f'_{case}' if k else ''}": (
+            "in_time",
+            f"densities over the time of a passage of '{case}'",
+            [file_of("density_in_time", case=case)],
+        )
+        for k, case in enumerate(followed_cases())
+    },
 }
 
 
@@ -144,5 +152,48 @@ for figure, (module, words, files) in DRAWN.items():
             module=module,
         message:
             f"Draw {words}"
+        shell:
+            "maglev figure {params.module} {input} --out {params.out} 2> {log}"
+
+
+# figure of every case: what it shows, and the stages of whose methods it is drawn
+OF_CASE = {
+    "exceedance": (
+        "exceedances by every method, with the limit states",
+        ("density", "limit_states"),
+    ),
+}
+
+
+def of_every_method(stages):
+    """Function that finds the files of stages for each method of a case."""
+
+    def found(wildcards) -> list[str]:
+        return [file for one in stages for file in of_methods(one, wildcards.case)]
+
+    return found
+
+
+for figure, (words, names) in OF_CASE.items():
+
+    rule:
+        name:
+            f"fig_{figure}"
+        input:
+            of_every_method(names),
+        output:
+            multiext(f"<results>/figures/{{case}}/{figure}", ".png", ".pdf", ".nc"),
+        log:
+            f"<logs>/figures/{{case}}/{figure}.log",
+        benchmark:
+            f"<benchmarks>/figures/{{case}}/{figure}.tsv"
+        conda:
+            "../envs/maglev.yaml"
+        params:
+            out=subpath(output[0], strip_suffix=".png"),
+            code=code_of("figures", f"figures.{figure}"),
+            module=figure,
+        message:
+            f"Draw {words} of {{wildcards.case}}"
         shell:
             "maglev figure {params.module} {input} --out {params.out} 2> {log}"

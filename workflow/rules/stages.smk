@@ -23,18 +23,21 @@ FILES = {
     "eev": "{case}/{method}/eev.nc",
     "density": "{case}/{method}/density.nc",
     "limits": "{case}/{method}/limits.nc",
+    "density_in_time": "{case}/in_time/density.nc",
+    "limit_states": "{case}/{method}/limit_states.nc",
     "accuracy": "{case}/accuracy.nc",
     "prediction": "{case}/prediction.nc",
     "tracks": "track/tracks.nc",
     "line": "tables/line.nc",
     "control_study": "tables/control_study.nc",
     "table1": "tables/table1.nc",
+    "limit_state_table": "tables/limit_states.nc",
     "paper_and_ours": "tables/paper_and_ours.nc",
     "statistics_check": "checks/{scope}.nc",
 }
 
 # jobs that run passages at the same time
-THREADS = {"dynamic_factor": 2, "tracks": 2}
+THREADS = {"density_in_time": 2, "dynamic_factor": 2, "tracks": 2}
 
 
 for stage in STAGES.values():

@@ -1,11 +1,9 @@
 # Which files the cases of the configuration and their methods have, for figures and targets.
 
 
-GAIN_CASES = [
-    case for case in parameters.cases if case.startswith("only_") or case == "all_gains"
-]
-VARIATION_CASES = [case for case in parameters.cases if case.startswith("cov_")]
-TRACK_CASES = [case for case in parameters.cases if parameters.cases[case].random_track]
+GAIN_CASES = named_cases(parameters.figures.by_gain)
+VARIATION_CASES = named_cases(parameters.figures.by_variation)
+TRACK_CASES = [case for case in CASES if parameters.cases[case].track == "random"]
 
 
 def judged(case: str) -> bool:
@@ -16,25 +14,25 @@ def judged(case: str) -> bool:
 def of_methods(stage: str, case: str) -> list[str]:
     """Files of a stage of each method of a case that it is made for."""
     methods = methods_of(case, STAGES[stage].methods)
-    return [place(stage, case=case, method=method) for method in methods]
+    return [file_of(stage, case=case, method=method) for method in methods]
 
 
 def of_baseline(stage: str) -> list[str]:
     """The file of the baseline of the case of the tables, if it has one."""
     has_one = methods_of(TABLE_CASE, (BASELINE,))
-    return [place(stage, case=TABLE_CASE, method=BASELINE)] if has_one else []
+    return [file_of(stage, case=TABLE_CASE, method=BASELINE)] if has_one else []
 
 
 def of_judged(stage: str) -> list[str]:
     """The file of the case of the tables, if its methods can be judged by a baseline."""
-    return [place(stage, case=TABLE_CASE)] if judged(TABLE_CASE) else []
+    return [file_of(stage, case=TABLE_CASE)] if judged(TABLE_CASE) else []
 
 
 def of_last_method(cases: list[str], *stages: str) -> list[str]:
     """A file of each stage and case by the last of its methods with a surrogate, or none at all."""
     designed = [methods_of(case, DESIGNED) for case in cases]
     return [
-        place(stage, case=case, method=methods[-1])
+        file_of(stage, case=case, method=methods[-1])
         for stage in stages
         for case, methods in zip(cases, designed, strict=True)
         if all(designed)
@@ -45,17 +43,21 @@ def on_tracks(case: str) -> bool:
     """Whether the case exists and its track is drawn, so that there can be others."""
     track = parameters.irregularity
     drawn = track.enabled and track.profile_file is None
-    return case in parameters.cases and case not in TRACK_CASES and drawn
+    return case in CASES and case not in TRACK_CASES and drawn
 
 
 def of_line() -> list[str]:
     """The file of the line, if there are tracks of the case of the tables."""
-    return [place("line")] if on_tracks(TABLE_CASE) else []
+    return [file_of("line")] if on_tracks(TABLE_CASE) else []
 
 
 def possible(stage, case: str) -> bool:
     """Whether a case has what a stage of it needs: methods, and a random track for its parts."""
+    if stage.name == "paper_and_ours" and RESPONSE not in parameters.responses_of_study:
+        return False
     of_track = "track_runs" in (stage.name, *stage.inputs)
+    if stage.name == "density_in_time" and case not in parameters.study.in_time.cases:
+        return False
     if "tracks" in (stage.name, *stage.inputs) and not on_tracks(case):
         return False
     needed = [STAGES[role] for role, one in stage.inputs.items() if not one.optional]
@@ -64,24 +66,32 @@ def possible(stage, case: str) -> bool:
     )
 
 
+def followed_cases() -> list[str]:
+    """Cases whose responses are followed over the time of a passage."""
+    stage = STAGES["density_in_time"]
+    return [case for case in parameters.cases if possible(stage, case)]
+
+
 def results() -> list[str]:
     """The file of every stage for all cases and methods that are named."""
     files = (
-        [place("statistics_check", scope="statistics")] if checked_cases(False) else []
+        [file_of("statistics_check", scope="statistics")]
+        if checked_cases(False)
+        else []
     )
     for name, stage in STAGES.items():
         wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
         if name == "control_study" and not CONTROL_CASES:
             continue
+        if name == "limit_state_table" and not parameters.cases:
+            continue
         if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
-            files.append(place(name))
+            files.append(file_of(name))
         if wildcards == {"case"}:
-            cases = [case for case in parameters.cases if possible(stage, case)]
-            files += [place(name, case=case) for case in cases]
+            cases = [case for case in CASES if possible(stage, case)]
+            files += [file_of(name, case=case) for case in cases]
         if wildcards == {"case", "method"}:
-            files += [
-                file for case in parameters.cases for file in of_methods(name, case)
-            ]
+            files += [file for case in CASES for file in of_methods(name, case)]
     return files
 
 
@@ -91,4 +101,8 @@ def figures_of_study() -> list[str]:
         f"<results>/figures/{name}.png"
         for name, (_, _, files) in DRAWN.items()
         if files
+    ] + [
+        f"<results>/figures/{case}/{name}.png"
+        for name in OF_CASE
+        for case in parameters.cases
     ]

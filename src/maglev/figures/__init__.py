@@ -19,6 +19,7 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "prediction": ("prediction",),
     "density_by_method": ("density*",),
     "exceedance_by_method": ("density*",),
+    "exceedance": ("density*", "limit_states*"),
     "density_by_gain": ("density*", "design*"),
     "limits_by_gain": ("limits*", "design*"),
     "density_by_variation": ("density*", "design*"),
@@ -32,11 +33,12 @@ FIGURES: Mapping[str, tuple[str, ...]] = {
     "track_split": ("track_split",),
     "tracks": ("line",),
     "track_limits": ("line",),
+    "in_time": ("density_in_time",),
 }
 """Every figure with the layouts of the files that it is drawn from, in order.
 
-A star stands for any number of files of that layout; two stars in one figure, for equally many,
-first all of the one, then all of the other."""
+A star stands for any number of files of that layout; two stars stand for equally many files, first
+all of the one layout, then all of the other."""
 
 
 def layouts_of(name: str, n_files: int) -> list[tuple[str, ...]]:

@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 
 from maglev.errors import UserError
 from maglev.figures import labels, style
-from maglev.vocabulary import METHODS
 
 AIM = 0.1
 """Error that counts as good, in standard deviations."""
@@ -35,7 +34,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         If the baseline carries no limit of a response.
     """
     levels = data["failure_probability"].to_numpy()
-    fig, panels = labels.response_panels(4.5)
+    fig, panels = labels.response_panels(data, 4.5)
     for response, axis, _ in panels:
         at = data.isel(response=response)
         carried = np.flatnonzero(np.isfinite(at["reference_held_limit"].to_numpy()))
@@ -46,8 +45,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         noise = float(at["reference_held_half_width"])
         axis.axhspan(_FLOOR, noise, color="#000000", alpha=0.1, lw=0, label="MCM's own noise")
         axis.axhline(AIM, color=style.QUIET, ls=":", lw=0.9, label=f"aim: {AIM} σ")
-        for row, code in enumerate(data["method"].to_numpy()):
-            method = METHODS[code]
+        for row, method in enumerate(data["method"].to_numpy().tolist()):
             n_runs = at["step_n_runs"].to_numpy()[row]
             error = np.abs(at["step_held_limit_error"].to_numpy()[row])
             kept = (n_runs > 0) & np.isfinite(error)
@@ -62,9 +60,9 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
             )
         axis.set(yscale="log", xlim=(0, None))
         axis.set_ylim(_FLOOR, max(5.0, axis.get_ylim()[1]))
-        if response % 3 == 0:
+        if response % labels.COLUMNS == 0:
             axis.set_ylabel("error of the limit [σ]")
-        if response >= 3:
+        if labels.lowest(response, data):
             axis.set_xlabel("number of runs")
         style.note(axis, f"at {levels[level]:g}: MCM ± {noise:.2g} σ")
     title = (

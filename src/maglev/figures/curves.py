@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from maglev.arrays import FloatArray
+from maglev.arrays import BoolArray, FloatArray
 from maglev.datasets import VARIABLES
 from maglev.errors import UserError
-from maglev.figures import labels
+from maglev.figures import labels, style
 from maglev.figures.style import Look
-from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
+from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS
 
 _ENDS = ("", "_low", "_high")
 _INFINITE = LIMIT_STATUS.index(INFINITE)
@@ -30,7 +30,7 @@ def named(data: Sequence[xr.Dataset]) -> xr.DataArray:
 def densities(data: Sequence[xr.Dataset]) -> xr.Dataset:
     """Put files of the layout ``density`` side by side along ``curve``.
 
-    A density is that of the GDEE, where there is none the direct one with its band.
+    A density is that of the GDEE, or the direct one with its band where there is none.
     """
     columns: dict[str, list[FloatArray]] = {}
 
@@ -85,13 +85,15 @@ def limits(data: Sequence[xr.Dataset]) -> xr.Dataset:
 def _gathered(
     data: Sequence[xr.Dataset], columns: dict[str, list[FloatArray]], last: tuple[str, ...]
 ) -> xr.Dataset:
+    for one in data[1:]:
+        if not np.array_equal(one["response"], data[0]["response"]):
+            raise UserError("all files must be of the same responses; compute them again")
     dims = ("curve", "response", *last)
     variables = {}
     for name, values in columns.items():
         stacked = np.stack(values).astype(VARIABLES[f"curve_{name}"].dtype)
         variables[f"curve_{name}"] = (dims[: stacked.ndim], stacked)
-    response = np.arange(len(RESPONSES), dtype=np.int8)
-    return xr.Dataset(variables, coords={"curve": named(data), "response": response})
+    return xr.Dataset(variables, coords={"curve": named(data), "response": data[0]["response"]})
 
 
 def body(curves: xr.Dataset, response: int, tail: float) -> tuple[float, float]:
@@ -108,13 +110,65 @@ def body(curves: xr.Dataset, response: int, tail: float) -> tuple[float, float]:
     return min(low) - margin, max(high) + margin
 
 
-def draw_densities(axis: Axes, curves: xr.Dataset, response: int, styles: Sequence[Look]) -> None:
+_FAR = 2.0
+"""Distance of a curve from all others, over their range, at which it would squeeze them [-]."""
+
+
+def apart(curves: xr.Dataset, response: int) -> BoolArray:
+    """Curves (curve,) whose densities lie so far from all others that they would squeeze them."""
+    spans = np.array(
+        [body(curves.isel(curve=[k]), response, 5e-3) for k in range(curves.sizes["curve"])]
+    )
+    far = np.zeros(len(spans), dtype=bool)
+    for k, (low, high) in enumerate(spans if len(spans) > 2 else []):
+        others = np.delete(spans, k, axis=0)
+        least, most = others[:, 0].min(), others[:, 1].max()
+        far[k] = max(low - most, least - high) > _FAR * (most - least)
+    return far
+
+
+def note_apart(axis: Axes, curve: xr.Dataset, response: int, look: Look) -> None:
+    """Write peak and range of a single curve that lies off the panel into its corner."""
+    shown = labels.shown(str(curve["response"].values[response]))
+    at = curve.isel(curve=0, response=response)
+    peak = int(at["curve_density"].argmax("cell"))
+    low, high = (shown.scale * end for end in body(curve, response, 5e-3))
+    style.note(
+        axis,
+        f"off the panel: {low:.3g} to {high:.3g} {shown.unit},\n"
+        f"peak {float(at['curve_density'][peak]) / shown.scale:.3g} "
+        f"at {shown.scale * float(at['curve_value'][peak]):.3g}",
+        color=look["color"],
+    )
+    axis.set_ylim(top=1.3 * axis.get_ylim()[1])  # the note stands above the curves
+
+
+def draw_densities(
+    axis: Axes,
+    curves: xr.Dataset,
+    response: int,
+    styles: Sequence[Look],
+    span: tuple[float, float],
+) -> None:
     """Draw the densities of a response, each with its band if it has one.
 
-    Curves that tower over the widest ones run out of the panel; their peaks are then written, in
-    their colours, into its upper right corner.
+    Curves far higher than the widest ones leave the panel; their peaks are then written, in their
+    colours, into the upper corner that is farther from them.
+
+    Parameters
+    ----------
+    axis
+        Where to draw.
+    curves
+        From `densities`.
+    response
+        Number of the response.
+    styles
+        Line style of each curve.
+    span
+        First and last value shown [unit of the response], as from `body`.
     """
-    shown = labels.SHOWN[response]
+    shown = labels.shown(str(curves["response"].to_numpy()[response]))
     at = curves.isel(response=response)
     peaks = at["curve_density"].max("cell").to_numpy() / shown.scale
     top = 1.12 * peaks[peaks <= 5.0 * peaks.min()].max()
@@ -128,18 +182,22 @@ def draw_densities(axis: Axes, curves: xr.Dataset, response: int, styles: Sequen
     beyond = [k for k in range(len(styles)) if peaks[k] > top]
     if beyond:
         top *= 1.0 + 0.1 * len(beyond)
+    highest = at["curve_value"].to_numpy()[beyond, at["curve_density"].argmax("cell")[beyond]]
+    right = bool(np.mean(highest - span[0]) < 0.6 * (span[1] - span[0])) if beyond else True
     for row, k in enumerate(sorted(beyond, key=lambda k: -peaks[k])):
         axis.text(
-            0.98,
+            0.98 if right else 0.02,
             0.97 - 0.1 * row,
             f"peak {peaks[k]:,.0f}" if peaks[k] >= 1e3 else f"peak {peaks[k]:.3g}",
             color=styles[k]["color"],
             transform=axis.transAxes,
-            ha="right",
+            ha="right" if right else "left",
             va="top",
             fontsize=6.5,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.9, "pad": 0.5},
+            zorder=5,
         )
+    axis.set_xlim(shown.scale * span[0], shown.scale * span[1])
     axis.set_ylim(0, top)
     axis.locator_params(axis="x", nbins=5)
     axis.set_xlabel(shown.axis)
@@ -150,15 +208,15 @@ def draw_limits(axis: Axes, x: FloatArray, at: xr.Dataset, look: Look) -> None:
     """Draw limits and their intervals against another quantity.
 
     The line and hollow markers are the limits given that levitation holds, filled markers those of
-    all passages: there are none where losses alone are likelier than the failure probability.  An
-    arrow stands for an interval without an upper end.
+    all passages, missing where losses alone are likelier than the failure probability.  An arrow
+    stands for an interval without an upper end.
 
     Parameters
     ----------
     axis
         Where to draw.
     x : (point,)
-        Places.
+        Abscissae.
     at
         ``curve_limit`` and ``curve_held_limit`` with their ends, on one dimension (point,), in
         the unit of the axis.
@@ -199,10 +257,24 @@ def draw_limits(axis: Axes, x: FloatArray, at: xr.Dataset, look: Look) -> None:
             )
 
 
+def limits_apart(at: xr.Dataset) -> BoolArray:
+    """Curves (curve,) whose limits lie so far above or below all others that they squeeze them."""
+    held = at["curve_held_limit"].to_numpy()
+    far = np.zeros(len(held), dtype=bool)
+    for k in range(len(held) if len(held) > 2 else 0):
+        others = np.delete(held, k, axis=0)
+        if np.isfinite(held[k]).any() and np.isfinite(others).any():
+            least, most = np.nanmin(others), np.nanmax(others)
+            gap = max(np.nanmin(held[k]) - most, least - np.nanmax(held[k]))
+            far[k] = gap > _FAR * (most - least)
+    return far
+
+
 def in_shown_unit(found: xr.Dataset, response: int) -> xr.Dataset:
     """Limits of a response in the unit in which it is shown."""
     names = [f"curve_{name}{end}" for name in ("limit", "held_limit") for end in _ENDS]
-    return labels.SHOWN[response].scale * found[names].isel(response=response)
+    scale = labels.shown(str(found["response"].to_numpy()[response])).scale
+    return scale * found[names].isel(response=response).drop_vars("response")
 
 
 def differ(found: xr.Dataset) -> bool:

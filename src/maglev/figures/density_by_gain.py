@@ -1,4 +1,4 @@
-"""Densities of the six extremes with each gain random alone, and with all of them."""
+"""Densities of the extremes with each gain random alone, and with all of them."""
 
 from __future__ import annotations
 
@@ -30,14 +30,12 @@ def figure(
     found = curves.densities(densities)
     looks, words = [], []
     for one, design in zip(densities, designs, strict=True):
-        name, look = labels.case_style(labels.gains_of(design))
+        name, look = labels.case_style(labels.parameters_of(design))
         looks.append(look)
         words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
-    fig, panels = labels.response_panels(4.7)
-    for response, axis, shown in panels:
-        curves.draw_densities(axis, found, response, looks)
-        low, high = curves.body(found, response, 5e-3)
-        axis.set_xlim(shown.scale * low, shown.scale * high)
+    fig, panels = labels.response_panels(found, 4.7)
+    for response, axis, _ in panels:
+        curves.draw_densities(axis, found, response, looks, curves.body(found, response, 5e-3))
     style.below(
         fig,
         panels[0][1].get_lines(),

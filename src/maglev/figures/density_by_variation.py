@@ -1,4 +1,4 @@
-"""Densities of the six extremes for growing coefficients of variation of the gains."""
+"""Densities of the extremes for growing coefficients of variation of the gains."""
 
 from __future__ import annotations
 
@@ -11,6 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from maglev.figures import curves, labels, style
+
+_TAILS = (5e-3, 1e-2, 2e-2, 4e-2)
+"""Shares of a density that may lie off the panel on either side [-]."""
+
+_NARROWEST = 0.1
+"""Width of the narrowest density over that of the panel, at least [-]."""
 
 
 def figure(
@@ -45,12 +51,11 @@ def figure(
             variations[order], found["curve_n_runs"], found["curve_lost_probability"], strict=True
         )
     ]
-    fig, panels = labels.response_panels(4.7)
+    fig, panels = labels.response_panels(found, 4.7)
     for response, axis, shown in panels:
-        curves.draw_densities(axis, found, response, looks)
-        low, high = curves.body(found, response, 5e-3)
-        axis.set_xlim(shown.scale * low, shown.scale * high)
-        _say_strays(axis, found.isel(response=response), high, shown)
+        span = _span(found, response)
+        curves.draw_densities(axis, found, response, looks, span)
+        _say_strays(axis, found.isel(response=response), span, shown)
     n_spans = labels.settings(designs[0])[1]
     style.below(
         fig,
@@ -62,19 +67,35 @@ def figure(
     return fig, found
 
 
-def _say_strays(axis: Axes, at: xr.Dataset, high: float, shown: labels.Shown) -> None:
-    """Note how much of the widest density lies right of the panel, and how far it reaches."""
+def _span(found: xr.Dataset, response: int) -> tuple[float, float]:
+    """Range of a panel, with as much of the tails as leaves the narrowest density its width."""
+    for tail in _TAILS:
+        low, high = curves.body(found, response, tail)
+        ends = [
+            curves.body(found.isel(curve=[k]), response, 0.05) for k in range(found.sizes["curve"])
+        ]
+        if min(end - start for start, end in ends) > _NARROWEST * (high - low):
+            break
+    return low, high
+
+
+def _say_strays(axis: Axes, at: xr.Dataset, span: tuple[float, float], shown: labels.Shown) -> None:
+    """Note how much of the widest density lies off the panel, and how far it reaches."""
     held = at["curve_exceedance"] - at["curve_lost_probability"]
-    farthest = at["curve_value"].where(held > 1e-9).max("cell")
-    most = int(np.argmax(farthest.to_numpy()))
-    reach = float(farthest[most])
-    low = axis.get_xlim()[0] / shown.scale
-    if reach > high + 0.25 * (high - low):
+    inside = at["curve_value"].where((held > 1e-9) & (held < held.max("cell") - 1e-9))
+    least, most = inside.min("cell").to_numpy(), inside.max("cell").to_numpy()
+    k = int(np.argmax(most - least))
+    share = np.interp(span, at["curve_value"][k], held[k])  # beyond either end
+    margin = 0.25 * (span[1] - span[0])
+    low, high = (f"{shown.scale * one[k]:.3g}" for one in (least, most))
+    below, beyond = float(held[k].max()) - share[0], share[1]
+    words = {
+        (True, True): f"{labels.percent(below + beyond)} off the panel,\nfrom {low} to {high}",
+        (True, False): f"{labels.percent(below)} below,\ndown to {low}",
+        (False, True): f"{labels.percent(beyond)} beyond,\nup to {high}",
+    }
+    reaches = (bool(least[k] < span[0] - margin), bool(most[k] > span[1] + margin))
+    if any(reaches):
         axis.set_ylim(top=1.3 * axis.get_ylim()[1])  # the note stands above the curves
-        beyond = float(np.interp(high, at["curve_value"][most], held[most]))
-        variation = float(at["curve_variation"][most])
-        style.note(
-            axis,
-            f"at {variation:.2f}: {labels.percent(beyond)} beyond,\n"
-            f"up to {shown.scale * reach:.3g} {shown.unit}",
-        )
+        variation = float(at["curve_variation"][k])
+        style.note(axis, f"at {variation:.2f}: {words[reaches]} {shown.unit}")

@@ -13,7 +13,7 @@ from maglev.figures import curves, labels, style
 
 
 def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
-    """Draw the exceedance of the six responses, the baseline with its band.
+    """Draw the exceedance of the responses, the baseline with its band.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
     found = curves.densities(densities)
     truth = methods.index("mcm")
     n = int(found["curve_n_runs"][truth])
-    fig, panels = labels.response_panels(4.6)
+    fig, panels = labels.response_panels(found, 4.6)
     for response, axis, shown in panels:
         at = found.isel(response=response)
         for number, name in enumerate(methods):
@@ -66,13 +66,13 @@ def figure(densities: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
         axis.set_ylim(0.7 / n, 1.3)
         baseline = at.isel(curve=truth)
         held = (baseline["curve_exceedance"] - baseline["curve_lost_probability"]).to_numpy()
-        places = baseline["curve_value"].to_numpy()
-        inside = places[(held < 0.999 * held.max()) & (held > 1.5 / n)]
+        values = baseline["curve_value"].to_numpy()
+        inside = values[(held < 0.999 * held.max()) & (held > 1.5 / n)]
         margin = 0.05 * np.ptp(inside)
         axis.set_xlim(shown.scale * (inside.min() - margin), shown.scale * (inside.max() + margin))
         axis.locator_params(axis="x", nbins=5)
         axis.set_xlabel(shown.axis)
-        if response % 3 == 0:
+        if response % labels.COLUMNS == 0:
             axis.set_ylabel("probability of exceedance [-]")
     style.below(fig, *panels[0][1].get_legend_handles_labels(), columns=3)
     return fig, found

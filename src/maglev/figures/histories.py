@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from maglev.errors import UserError
 from maglev.figures import style
-from maglev.vocabulary import RESPONSES
+from maglev.vocabulary import PAPER_RESPONSES
 
 _LABELS = {
     "girder_displacement_z": ("girder, vertical\ndisplacement [mm]", 1e3, "mm"),
@@ -37,12 +37,12 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     UserError
         If there are no histories.
     """
-    names = [f"{name}_history" for name in RESPONSES]
+    names = [f"{name}_history" for name in PAPER_RESPONSES]
     if any(name not in data for name in names):
         raise UserError("figure histories: the passage has no histories")
     fig, axes = style.panels(3, 2, style.PAGE, 5.4)
     first = data.isel(sample=0)
-    for axis, response in zip(axes, RESPONSES, strict=True):
+    for axis, response in zip(axes, PAPER_RESPONSES, strict=True):
         label, scale, unit = _LABELS[response]
         history = scale * first[f"{response}_history"]
         where = ""
@@ -58,6 +58,6 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         style.note(axis, f"largest {extreme:.3g} {unit} at {at:.2f} s{where}")
     for axis in axes[-2:]:
         axis.set_xlabel("time [s]")
-    extremes = [*RESPONSES, *(f"{name}_t" for name in RESPONSES)]
-    per_car = [f"{name}_per_car" for name in RESPONSES if name.startswith("car_body")]
+    extremes = [*PAPER_RESPONSES, *(f"{name}_t" for name in PAPER_RESPONSES)]
+    per_car = [f"{name}_per_car" for name in PAPER_RESPONSES if name.startswith("car_body")]
     return fig, data[[*names, *extremes, *per_car]].isel(sample=[0])

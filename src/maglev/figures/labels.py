@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from string import ascii_lowercase
 from typing import SupportsFloat, SupportsInt
 
 import xarray as xr
@@ -14,7 +17,7 @@ from matplotlib.typing import LineStyleType
 
 from maglev.errors import UserError
 from maglev.figures import style
-from maglev.vocabulary import GAINS, METHODS, RESPONSES
+from maglev.vocabulary import METHODS, RESPONSE_UNITS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,30 +49,72 @@ class Shown:
     @property
     def density_axis(self) -> str:
         """Label of an axis of its density."""
-        return f"density [{'1/mm' if self.unit == 'mm' else 's²/m'}]"
+        inverse = {"mm": "1/mm", "m/s²": "s²/m", "-": "-"}.get(self.unit, f"1/({self.unit})")
+        return f"density [{inverse}]"
 
 
-_MM, _ACCELERATION = (1e3, "mm"), (1.0, "m/s²")
-SHOWN = tuple(
-    Shown(name=name, symbol=symbol, scale=scale, unit=unit)
-    for name, symbol, (scale, unit) in (
-        ("midspan displacement, vert.", "displacement", _MM),
-        ("midspan displacement, lat.", "displacement", _MM),
-        ("midspan acceleration, vert.", "acceleration", _ACCELERATION),
-        ("midspan acceleration, lat.", "acceleration", _ACCELERATION),
-        ("car-body acceleration, vert.", "acceleration", _ACCELERATION),
-        ("car-body acceleration, lat.", "acceleration", _ACCELERATION),
-    )
-)
-"""How each response is shown, in the order of `maglev.vocabulary.RESPONSES`."""
+_AXIS = {
+    "m": ("displacement", 1e3, "mm"),
+    "m s-2": ("acceleration", 1.0, "m/s²"),
+}
+"""Symbol, scale and unit on an axis of responses of a unit; others are shown as they are."""
 
-assert len(SHOWN) == len(RESPONSES)
+_NAMES: Mapping[str, str] = {
+    "girder_displacement_z": "midspan displacement, vert.",
+    "girder_displacement_y": "midspan displacement, lat.",
+    "girder_acceleration_z": "midspan acceleration, vert.",
+    "girder_acceleration_y": "midspan acceleration, lat.",
+    "car_body_acceleration_z": "car-body acceleration, vert.",
+    "car_body_acceleration_y": "car-body acceleration, lat.",
+}
+"""Titles of panels; of any other response its name in words."""
 
-GAIN = ("suspension $k_p$", "suspension $k_d$", "guidance $k_p$", "guidance $k_d$")
-"""The gains in short, in the order of `maglev.vocabulary.GAINS`."""
 
-GAIN_COLOUR = ("#0072B2", "#56B4E9", "#D55E00", "#E69F00")
+def shown(response: str) -> Shown:
+    """How a response is shown.
+
+    Examples
+    --------
+    >>> shown("girder_displacement_z").axis
+    'displacement [mm]'
+    """
+    name = response.replace("_", " ").removesuffix(" z").removesuffix(" y")
+    side = {"_z": ", vert.", "_y": ", lat."}.get(response[-2:], "")
+    unit = RESPONSE_UNITS[response]
+    symbol, scale, written = _AXIS.get(unit, (name, 1.0, unit.replace("1", "-")))
+    if "displacement" not in response and symbol == "displacement":
+        symbol = name
+    title = _NAMES.get(response, f"{name}{side}")
+    return Shown(name=title, symbol=symbol, scale=scale, unit=written)
+
+
+GAIN = {
+    "gains.suspension_proportional": "suspension $k_p$",
+    "gains.suspension_derivative": "suspension $k_d$",
+    "gains.guidance_proportional": "guidance $k_p$",
+    "gains.guidance_derivative": "guidance $k_d$",
+}
+"""The gains in short, by their keys in the configuration."""
+
+GAIN_COLOUR = dict(zip(GAIN, ("#0072B2", "#56B4E9", "#D55E00", "#E69F00"), strict=True))
 """Their colours: suspension blue, guidance orange."""
+
+
+def parameter_name(key: str) -> str:
+    """Name of a random quantity in short, from its dotted key.
+
+    Examples
+    --------
+    >>> parameter_name("train.car_body.mass")
+    'car body mass'
+    """
+    return GAIN.get(key, " ".join(key.split(".")[-2:]).replace("_", " "))
+
+
+def parameter_colour(key: str) -> str:
+    """Colour of a random quantity."""
+    return GAIN_COLOUR.get(key, "#009E73")
+
 
 _DASHES: tuple[LineStyleType, ...] = ("--", "-.", (0, (4, 1, 1, 1, 1, 1)), ":")
 
@@ -77,7 +122,7 @@ METHOD = {"mcm": "MCM", "osm": "OSM", "asm_paper": "ASM (paper)", "asm": "ASM (o
 """The methods in short."""
 
 PDEM = {"mcm": "MCM", "osm": "OSM-PDEM", "asm_paper": "ASM-PDEM (paper)", "asm": "ASM-PDEM (ours)"}
-"""The same for what is found with the density evolution."""
+"""The methods in short, with the density evolution."""
 
 METHOD_STYLE: dict[str, style.Look] = {
     "mcm": {"color": "#000000", "ls": "-"},
@@ -113,16 +158,22 @@ def case_name(data: xr.Dataset) -> str:
 def settings(design: xr.Dataset) -> tuple[float, int]:
     """Coefficient of variation and number of spans of the case of a design or a set of runs.
 
+    The coefficient is NaN where the random quantities of the case have several or none.
+
     Raises
     ------
     UserError
         If the file does not say them.
     """
     try:
-        of_case = json.loads(design.attrs["config"])["cases"][design.attrs["case"]]
-        return float(of_case["coefficient_of_variation"]), int(of_case["n_spans"])
+        config = json.loads(design.attrs["config"])
+        laws = config["cases"][design.attrs["case"]]["random"].values()
+        n_spans = int(config["guideway"]["n_spans"])
     except (KeyError, TypeError):
         raise UserError("the file must say its case and how it was configured") from None
+    variations = {law.get("coefficient_of_variation") for law in laws}
+    only = variations.pop() if len(variations) == 1 else None
+    return float("nan") if only is None else float(only), n_spans
 
 
 def confidence(data: xr.Dataset) -> str:
@@ -139,19 +190,23 @@ def confidence(data: xr.Dataset) -> str:
         raise UserError("the file must say the confidence of its intervals") from None
 
 
-def gains_of(data: xr.Dataset) -> list[int]:
-    """Numbers of the random gains of a file."""
-    return [int(number) for number in data["parameter"].to_numpy()]
+def parameters_of(data: xr.Dataset) -> list[str]:
+    """Keys of the random quantities of a file."""
+    return [str(key) for key in data["parameter"].to_numpy()]
 
 
-def case_style(parameters: list[int]) -> tuple[str, style.Look]:
-    """Name and line style of a case, from its random gains."""
+def case_style(parameters: list[str]) -> tuple[str, style.Look]:
+    """Name and line style of a case, from its random quantities."""
     if len(parameters) == 1:
-        number = parameters[0]
-        return f"{GAIN[number]} alone", {"color": GAIN_COLOUR[number], "ls": _DASHES[number]}
-    if len(parameters) == len(GAINS):
+        (key,) = parameters
+        dashes = _DASHES[list(GAIN).index(key)] if key in GAIN else "-"
+        return f"{parameter_name(key)} alone", {"color": parameter_colour(key), "ls": dashes}
+    if set(parameters) == set(GAIN):
         return "all four gains", {"color": "#000000", "ls": "-"}
-    return " and ".join(GAIN[number] for number in parameters), {"color": "#999999", "ls": "-"}
+    words = " and ".join(parameter_name(key) for key in parameters)
+    if len(parameters) > 3:
+        words = f"{len(parameters)} random quantities"
+    return words, {"color": "#999999", "ls": "-"}
 
 
 _GROUP = {
@@ -201,18 +256,36 @@ def _in_ms(words: str) -> str:
     return re.sub(r"([0-9.e+-]+) s\b", lambda found: f"{1e3 * float(found[1]):g} ms", words)
 
 
-def response_panels(height: float) -> tuple[Figure, list[tuple[int, Axes, Shown]]]:
-    """A figure of six titled panels; for each response its number, its panel and its labels.
+COLUMNS = 3
+"""Panels side by side."""
+
+
+def response_panels(
+    data: xr.Dataset, height: float
+) -> tuple[Figure, list[tuple[int, Axes, Shown]]]:
+    """A figure of titled panels; for each response its number, its panel and its labels.
 
     Parameters
     ----------
+    data
+        What is shown, along ``response``.
     height
-        Of the figure [inch].
+        Of the figure with two rows of panels [inch].
     """
-    figure, axes = style.panels(2, 3, style.PAGE, height)
-    for letter, axis, shown in zip("abcdef", axes, SHOWN, strict=True):
-        style.titled(axis, letter, shown.name)
-    return figure, list(zip(range(len(SHOWN)), axes, SHOWN, strict=True))
+    names = [shown(str(one)) for one in data["response"].to_numpy()]
+    columns = min(COLUMNS, len(names))
+    rows = -(-len(names) // columns)
+    figure, axes = style.panels(rows, columns, style.PAGE, height * (0.25 + 0.375 * rows))
+    for letter, axis, one in zip(ascii_lowercase, axes, names, strict=False):
+        style.titled(axis, letter, one.name)
+    for axis in axes[len(names) :]:
+        axis.remove()
+    return figure, list(zip(range(len(names)), axes, names, strict=False))
+
+
+def lowest(number: int, data: xr.Dataset) -> bool:
+    """Whether no panel stands below that of a response."""
+    return number >= data.sizes["response"] - COLUMNS
 
 
 def of_runs(name: str, n_runs: SupportsInt, lost_probability: SupportsFloat) -> str:
@@ -223,7 +296,8 @@ def of_runs(name: str, n_runs: SupportsInt, lost_probability: SupportsFloat) -> 
 def of_settings(design: xr.Dataset) -> str:
     """Title of a legend: coefficient of variation and number of spans."""
     variation, n_spans = settings(design)
-    return f"random ({n_spans} spans, coefficient of variation {variation:.2f})"
+    by = "" if math.isnan(variation) else f", coefficient of variation {variation:.2f}"
+    return f"random ({n_spans} spans{by})"
 
 
 def percent(share: float) -> str:

@@ -1,4 +1,4 @@
-"""Limits of the six extremes against failure probability for each sharing of circuits."""
+"""Limits of the extremes against failure probability for each sharing of circuits."""
 
 from __future__ import annotations
 
@@ -40,12 +40,19 @@ def figure(
         looks.append({**look, "marker": _MARKERS[number % len(_MARKERS)]})
         words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
         handles.append(Line2D([], [], **looks[-1], ms=3.5))
-    fig, panels = labels.response_panels(4.7)
+    fig, panels = labels.response_panels(found, 4.7)
     for response, axis, shown in panels:
         at = curves.in_shown_unit(found, response)
+        far = curves.limits_apart(at)
         for number, look in enumerate(looks):
-            apart = 1.06 ** (number - 0.5 * (len(looks) - 1))
-            curves.draw_limits(axis, levels * apart, at.isel(curve=number), look)
+            beside = 1.06 ** (number - 0.5 * (len(looks) - 1))
+            if not far[number]:
+                curves.draw_limits(axis, levels * beside, at.isel(curve=number), look)
+                continue
+            values = at["curve_held_limit"].isel(curve=number).to_numpy()
+            words_of = ", ".join(f"{value:.3g}" for value in values)
+            style.note(axis, f"off the panel: {words_of}", color=look["color"])
+            axis.set_ymargin(0.2)  # the note stands above the curves
         axis.set_xscale("log")
         axis.set_xlim(1.7 * levels.max(), levels.min() / 1.7)
         axis.set_xticks(levels, [f"{level:g}" for level in levels], minor=False)

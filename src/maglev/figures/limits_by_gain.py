@@ -1,4 +1,4 @@
-"""Limits of the six extremes against failure probability, gains random alone and together."""
+"""Limits of the extremes against failure probability, gains random alone and together."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 
 from maglev.figures import curves, labels, style
 
-_MARKERS = ("o", "s", "^", "D")
+_MARKERS = dict(zip(labels.GAIN, ("o", "s", "^", "D"), strict=True))
 
 
 def figure(
@@ -36,13 +36,13 @@ def figure(
     words: list[str] = []
     looks: list[style.Look] = []
     for one, design in zip(limits, designs, strict=True):
-        parameters = labels.gains_of(design)
+        parameters = labels.parameters_of(design)
         name, look = labels.case_style(parameters)
-        marker = _MARKERS[parameters[0]] if len(parameters) == 1 else "v"
+        marker = _MARKERS.get(parameters[0], "P") if len(parameters) == 1 else "v"
         looks.append({**look, "marker": marker})
         words.append(labels.of_runs(name, one["n_runs"], one["lost_probability"]))
         handles.append(Line2D([], [], **looks[-1], ms=3.5))
-    fig, panels = labels.response_panels(4.7)
+    fig, panels = labels.response_panels(found, 4.7)
     for response, axis, shown in panels:
         at = curves.in_shown_unit(found, response)
         for number, look in enumerate(looks):

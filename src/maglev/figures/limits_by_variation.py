@@ -1,4 +1,4 @@
-"""Limits of the six extremes against the coefficient of variation of the gains."""
+"""Limits of the extremes against the coefficient of variation of the gains."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def figure(
     variation = variations[order]
     levels = found["failure_probability"].to_numpy()
     step = np.diff(variation).min() if variation.size > 1 else 0.02
-    fig, panels = labels.response_panels(4.7)
+    fig, panels = labels.response_panels(found, 4.7)
     for response, axis, shown in panels:
         at = curves.in_shown_unit(found, response)
         for number in range(levels.size):

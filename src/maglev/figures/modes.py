@@ -70,8 +70,8 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     top.set_title(f"(a) first vertical mode {first:.2f} Hz", loc="left")
 
     chosen = _families(data)
-    for place, k in enumerate(chosen):
-        axis = fig.add_subplot(grid[1 + place // 4, place % 4])
+    for panel, k in enumerate(chosen):
+        axis = fig.add_subplot(grid[1 + panel // 4, panel % 4])
         mode = data.isel(mode=k)
         lateral = flags[int(mode["direction"].item())] in ("lateral", "torsion")
         across = "y" if lateral else "z"
@@ -83,11 +83,11 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         axis.margins(x=0)
         word = flags[int(mode["direction"].item())]
         axis.set_title(
-            f"({'bcdefghi'[place]}) {mode['frequency'].item():.2f} Hz, {word}", loc="left"
+            f"({'bcdefghi'[panel]}) {mode['frequency'].item():.2f} Hz, {word}", loc="left"
         )
-        if place % 4 == 0:
+        if panel % 4 == 0:
             axis.set_ylabel("shape [-]")
             axis.legend(loc="lower left")
-        if place >= len(chosen) - 4:
+        if panel >= len(chosen) - 4:
             axis.set_xlabel("x [m]")
     return fig, data

@@ -8,11 +8,13 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from maglev.figures import labels, style
-from maglev.vocabulary import METHODS
+
+_COLUMNS = 6
+"""Panels side by side."""
 
 
 def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
-    """Draw a row of six panels per method, runs as a density of points about the diagonal.
+    """Draw a row of panels per method, runs as a density of points about the diagonal.
 
     Parameters
     ----------
@@ -24,14 +26,21 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     figure, plotted
         The figure and the numbers in it.
     """
-    methods = [METHODS[code] for code in data["method"].to_numpy()]
+    methods = data["method"].to_numpy().tolist()
     held = data["status"].to_numpy() == 0
-    fig = Figure(figsize=(style.PAGE, 1.6 + 0.93 * len(methods)), layout="constrained")
-    axes = fig.subplots(len(methods), len(labels.SHOWN), squeeze=False, sharex="col", sharey="col")
+    every = [labels.shown(str(one)) for one in data["response"].to_numpy()]
+    columns = min(_COLUMNS, len(every))
+    blocks = -(-len(every) // columns)
+    n_rows = blocks * len(methods)
+    fig = Figure(figsize=(style.PAGE, 1.6 + 0.93 * n_rows), layout="constrained")
+    axes = fig.subplots(n_rows, columns, squeeze=False)
+    for axis in axes[-len(methods) :, len(every) - columns * (blocks - 1) :].ravel():
+        axis.remove()
     drawn = None
     for row in range(len(methods)):
-        for response, shown in enumerate(labels.SHOWN):
-            axis = axes[row, response]
+        for response, shown in enumerate(every):
+            block, column = divmod(response, columns)
+            axis = axes[block * len(methods) + row, column]
             computed = shown.scale * data["computed"].to_numpy()[held, response]
             predicted = shown.scale * data["predicted_by"].to_numpy()[row, held, response]
             low, high = np.quantile(computed, [0.0, 0.999])
@@ -53,22 +62,28 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
             axis.locator_params(axis="x", nbins=2)
             axis.locator_params(axis="y", nbins=3)
             axis.tick_params(labelsize=6)
-            axis.tick_params(axis="x", labelrotation=45)
+            axis.tick_params(axis="x", labelrotation=45, labelbottom=row == len(methods) - 1)
             error = float(data["prediction_rmse"][row, response])
             style.note(axis, f"{error:.2f} σ", top=False)
             if row == 0:
                 axis.set_title(f"{shown.name.replace(' ', chr(10), 1)}", fontsize=6)
             if row == len(methods) - 1:
                 axis.set_xlabel(f"computed [{shown.unit}]", fontsize=6)
-    for row, method in enumerate(methods):
-        n_runs = int(data["method_n_runs"][row])
-        axes[row, 0].set_ylabel(f"{labels.METHOD[method]}\n{n_runs} runs\npredicted", fontsize=7)
+    for number, method in enumerate(blocks * methods):
+        n_runs = int(data["method_n_runs"][number % len(methods)])
+        axes[number, 0].set_ylabel(f"{labels.METHOD[method]}\n{n_runs} runs\npredicted", fontsize=7)
     fig.suptitle(
         "predicted against computed extremes; in the corners RMSE over the standard deviation",
         fontsize=8,
     )
     assert drawn is not None
     fig.colorbar(
-        drawn, ax=axes, location="bottom", shrink=0.4, aspect=40, pad=0.02, label="runs in a cell"
+        drawn,
+        ax=fig.axes,
+        location="bottom",
+        shrink=0.4,
+        aspect=40,
+        pad=0.02,
+        label="runs in a cell",
     )
     return fig, data

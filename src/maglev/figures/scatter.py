@@ -1,4 +1,4 @@
-"""Dependence of the six extremes: pairs of responses of the baseline as densities of points."""
+"""Dependence of the paper's responses: pairs of extremes of the baseline as densities of points."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from maglev.figures import labels, style
-from maglev.vocabulary import RESPONSES
+from maglev.vocabulary import PAPER_RESPONSES
 
 _SHORT = (
     "midspan\ndispl. vert.",
@@ -35,16 +35,14 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         The figure and the numbers in it.
     """
     held = data["status"].to_numpy() == 0
-    values = [
-        labels.SHOWN[k].scale * data[name].to_numpy()[held] for k, name in enumerate(RESPONSES)
-    ]
+    values = [labels.shown(name).scale * data[name].to_numpy()[held] for name in PAPER_RESPONSES]
     n, n_lost = held.size, int((~held).sum())
     spans = []
     for one in values:
         low, high = one.min(), np.quantile(one, 0.998)
         margin = 0.06 * (high - low)
         spans.append((low - margin, high + margin))
-    size = len(RESPONSES)
+    size = len(PAPER_RESPONSES)
     layout = ConstrainedLayoutEngine(w_pad=0.02, h_pad=0.02, wspace=0.02, hspace=0.02)
     fig = Figure(figsize=(style.PAGE, 6.8), layout=layout)
     axes = fig.subplots(size, size, sharex="col")
@@ -77,9 +75,13 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         if column > 0:
             axis.set_yticklabels([])
         if row == size - 1:
-            axis.set_xlabel(f"{_SHORT[column]}\n[{labels.SHOWN[column].unit}]", fontsize=7)
+            axis.set_xlabel(
+                f"{_SHORT[column]}\n[{labels.shown(PAPER_RESPONSES[column]).unit}]", fontsize=7
+            )
         if column == 0:
-            axis.set_ylabel(f"{_SHORT[row]}\n[{labels.SHOWN[row].unit}]", fontsize=7)
+            axis.set_ylabel(
+                f"{_SHORT[row]}\n[{labels.shown(PAPER_RESPONSES[row]).unit}]", fontsize=7
+            )
     fig.align_labels()
     assert drawn is not None
     inset = fig.add_axes((0.66, 0.72, 0.25, 0.015))
@@ -96,4 +98,4 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         fontsize=8,
         va="center",
     )
-    return fig, data[[*RESPONSES, "status"]]
+    return fig, data[[*PAPER_RESPONSES, "status"]]

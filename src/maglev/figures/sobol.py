@@ -1,4 +1,4 @@
-"""Which gain matters for which response: Sobol' indices of the surrogate."""
+"""Sobol' indices of the surrogate: the effect of each random quantity on each response."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from maglev.figures import labels, style
 
 
 def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
-    """Draw first-order and total indices of every gain and response with their intervals.
+    """Draw first-order and total indices of every quantity and response with their intervals.
 
     Parameters
     ----------
@@ -23,10 +23,10 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     figure, plotted
         The figure and the numbers in it.
     """
-    gains = labels.gains_of(data)
-    place = np.arange(len(gains))[::-1]
-    colours = [labels.GAIN_COLOUR[number] for number in gains]
-    fig, panels = labels.response_panels(3.9)
+    keys = labels.parameters_of(data)
+    row = np.arange(len(keys))[::-1]
+    colours = [labels.parameter_colour(key) for key in keys]
+    fig, panels = labels.response_panels(data, 3.9 * max(1.0, len(keys) / 6))
     for response, axis, _ in panels:
         at = data.isel(response=response)
         for name, shift, filled in (("sobol_first", 0.2, True), ("sobol_total", -0.2, False)):
@@ -34,7 +34,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
             low, high = (at[f"{name}_{end}"].to_numpy() for end in ("low", "high"))
             reach = np.abs([middle - low, high - middle])
             axis.barh(
-                place + shift,
+                row + shift,
                 middle,
                 height=0.36,
                 color=colours if filled else "white",
@@ -43,7 +43,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
                 xerr=reach,
                 error_kw={"elinewidth": 0.8, "capsize": 1.5, "ecolor": "#000000"},
             )
-        axis.set_yticks(place, [labels.GAIN[number] for number in gains])
+        axis.set_yticks(row, [labels.parameter_name(key) for key in keys])
         axis.grid(visible=False, axis="y")
         axis.set_xlim(0, 1.05)
         error = float(at["leave_one_out_error"])
@@ -54,16 +54,16 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
             ha="right",
             fontsize=6.5,
         )
-        if response % 3:
+        if response % labels.COLUMNS:
             axis.set_yticklabels([])
-        if response >= 3:
+        if labels.lowest(response, data):
             axis.set_xlabel("share of the variance [-]")
     handles = [
         Patch(facecolor=style.QUIET, edgecolor=style.QUIET),
         Patch(facecolor="white", edgecolor=style.QUIET),
     ]
     confidence = labels.confidence(data)
-    words = ["first order: the gain alone", "total: with all its interactions"]
+    words = ["first order: the quantity alone", "total: with all its interactions"]
     style.below(
         fig,
         handles,

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from matplotlib.contour import QuadContourSet
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
 
 from maglev.figures import labels, style
 from maglev.vocabulary import STATUS, STEP_TOO_LARGE
@@ -43,6 +45,7 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
     fastest = max(float(growth[:, x >= left].max()), 1e-3)
     levels = np.linspace(0.0, fastest, 9)
     filled = chart.contourf(x, y, growth, levels=levels, cmap="Oranges", alpha=0.8)
+    _end_at_border(filled, stability)
     fig.colorbar(filled, ax=chart, label="growth rate [1/s]", shrink=0.9, format="%.2g")
     size = 1.2 if status.size > 2000 else 2.5
     held = status == 0
@@ -61,8 +64,10 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
         of_lag = stability.sel(current_lag=lag)
         by_k_d = (of_lag["proportional_border"].to_numpy()[::-1], y[::-1])
         by_k_p = (x, of_lag["derivative_border"].to_numpy())
-        chart.plot(*np.hstack([by_k_d, by_k_p]), line, color=colour, lw=1.2, zorder=3)
-    chart.axvline(static, color="#000000", ls="--", lw=0.9)
+        whole = np.hstack([by_k_d, by_k_p])
+        whole = whole[:, np.isfinite(whole).all(axis=0)]  # straight between points of the map
+        chart.plot(*whole, line, color=colour, lw=1.2, zorder=3)
+    chart.axvline(static, color="#000000", ls="--", lw=0.9, zorder=4)
     chart.plot(
         float(stability["mean_proportional"]), float(stability["mean_derivative"]), "P",
         color="white", mec="#000000", mew=0.6, ms=6,
@@ -76,11 +81,12 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
     held_count, lost_count = (np.histogram(k_p[chosen], edges)[0] for chosen in (held, away))
     count.stairs(held_count, edges, color="#0072B2", fill=True, alpha=0.5, label="held")
     count.stairs(lost_count, edges, color="#000000", fill=True, label="lost")
-    count.axvline(static, color="#000000", ls="--", lw=0.9)
+    count.axvline(static, color="#000000", ls="--", lw=0.9, zorder=4)
     border = float(stability["proportional_border_low"])
     count.axvline(border, color=_LOST, lw=1.2)
     count.set(yscale="log", ylim=(0.7, None), xlim=_around(np.append(k_p, static), x))
     count.set(xlabel="suspension $k_p$ [A/m]", ylabel="runs")
+    count.legend(loc="upper right")
 
     variation, _ = labels.settings(runs)
     n, n_lost = status.size, int(away.sum())
@@ -103,6 +109,18 @@ def figure(stability: xr.Dataset, runs: xr.Dataset) -> tuple[Figure, xr.Dataset]
     style.below(fig, handles, words, columns=3)
     gains = runs[["suspension_proportional_gain", "suspension_derivative_gain", "status"]]
     return fig, xr.merge([stability, gains])
+
+
+def _end_at_border(filled: QuadContourSet, stability: xr.Dataset) -> None:
+    """Let the shading end at a drawn border that parts the map, not between points of the map."""
+    x, y = stability["grid_proportional"].to_numpy(), stability["grid_derivative"].to_numpy()
+    grows = stability["growth_rate"].to_numpy() > 0
+    for border in stability["proportional_border"].to_numpy():
+        if np.array_equal(grows, x < border[:, None]):
+            left = np.column_stack([np.full(y.size, x[0]), y])
+            inside = np.vstack([left, np.column_stack([border, y])[::-1]])
+            filled.set_clip_path(Polygon(inside, transform=filled.axes.transData))
+            return
 
 
 def _around(gains: np.ndarray, grid: np.ndarray) -> tuple[float, float]:

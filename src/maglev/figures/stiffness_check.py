@@ -1,4 +1,4 @@
-"""Static deflection against first frequency: where a bridge of any stiffness must lie."""
+"""Static deflection against first frequency: the curve of a bridge of any stiffness."""
 
 from __future__ import annotations
 

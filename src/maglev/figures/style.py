@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from string import ascii_lowercase
 from typing import TypedDict
 
 import matplotlib as mpl
@@ -75,12 +76,14 @@ def panels(rows: int, columns: int, width: float, height: float) -> tuple[Figure
     """A figure of equal panels, lettered (a), (b) … from left to right; sizes in inches."""
     figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.07))
     axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
-    for letter, axis in zip("abcdefghijklmnop", axes, strict=False):
+    for letter, axis in zip(ascii_lowercase, axes, strict=False):
         axis.set_title(f"({letter})", loc="left")
     return figure, axes
 
 
-def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None:
+def note(
+    axis: Axes, text: str, *, top: bool = True, right: bool = True, color: str = "#000000"
+) -> None:
     """Write a note into a corner of a panel."""
     axis.text(
         0.98 if right else 0.02,
@@ -90,6 +93,7 @@ def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None
         ha="right" if right else "left",
         va="top" if top else "bottom",
         fontsize=7,
+        color=color,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
         zorder=5,
     )
@@ -98,7 +102,7 @@ def note(axis: Axes, text: str, *, top: bool = True, right: bool = True) -> None
 def table(
     axis: Axes,
     rows: Sequence[Sequence[str]],
-    places: Sequence[float],
+    columns: Sequence[float],
     colours: Sequence[str],
     height: float,
 ) -> None:
@@ -110,7 +114,7 @@ def table(
         Panel, which loses its axes.
     rows
         The heading and the rows, a text per column.
-    places
+    columns
         Left end of each column [share of the width].
     colours
         Colour of each row behind the heading.
@@ -121,7 +125,7 @@ def table(
     for number, row in enumerate(rows):
         y = 0.97 - height * number
         colour = "#000000" if number == 0 else colours[number - 1]
-        for x, text in zip(places, row, strict=True):
+        for x, text in zip(columns, row, strict=True):
             axis.text(x, y, text, color=colour, fontsize=7, va="top", transform=axis.transAxes)
     y = 0.97 - height + 0.035
     axis.plot([0.0, 1.0], [y, y], color="#000000", lw=0.5, transform=axis.transAxes)

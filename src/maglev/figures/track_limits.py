@@ -1,4 +1,4 @@
-"""Limits of the six extremes on each of many tracks, and of the line, with their intervals."""
+"""Limits of the extremes on each of many tracks, and of the line, with their intervals."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     """
     n, seed = data.sizes["track"], int(data["seed_of_track"][0])
     levels = data["failure_probability"].to_numpy()
-    fig, panels = labels.response_panels(4.9)
+    fig, panels = labels.response_panels(data, 4.9)
     for response, axis, shown in panels:
         at = data.isel(response=response)
-        for place in range(levels.size):
-            one = at.isel(failure_probability=place)
+        for column in range(levels.size):
+            one = at.isel(failure_probability=column)
             limit = shown.scale * one["held_limit_on_track"].to_numpy()
             rank = np.argsort(np.argsort(limit[1:]))
-            spread = place + _APART * (2.0 * rank / max(n - 2, 1) - 1.0) * 0.75
+            spread = column + _APART * (2.0 * rank / max(n - 2, 1) - 1.0) * 0.75
             axis.plot(spread, limit[1:], **_TRACK)
-            _with_interval(axis, place - _APART, one, "held_limit_on_track", shown.scale, _SEED, 0)
+            _with_interval(axis, column - _APART, one, "held_limit_on_track", shown.scale, _SEED, 0)
             if int(one["held_limit_of_line_status"]) == _GIVEN:
                 _with_interval(
-                    axis, place + _APART, one, "held_limit_of_line", shown.scale, _LINE, None
+                    axis, column + _APART, one, "held_limit_of_line", shown.scale, _LINE, None
                 )
         axis.set_xticks(np.arange(levels.size), [f"{level:g}" for level in levels])
         axis.set_xlim(-0.6, levels.size - 0.4)

@@ -1,4 +1,4 @@
-"""Contributions of random gains and a random track to the six extremes."""
+"""Contributions of random gains and a random track to the extremes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     figure, plotted
         The figure and the numbers in it.
     """
-    fig, panels = labels.response_panels(4.9)
+    fig, panels = labels.response_panels(data, 4.9)
     for response, axis, shown in panels:
         at = data.isel(response=response)
         curves = {name: at[name].to_numpy() / shown.scale for name in _PARTS}

@@ -1,4 +1,4 @@
-"""Densities of the six extremes on each of many tracks, and over all of them: the line."""
+"""Densities of the extremes on each of many tracks, and over all of them: the line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LINE: style.Look = {"color": "#000000", "lw": 1.4}
 def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     """Draw each track's part of the density of the line, and the shares of the variance.
 
-    A track's density is over the number of tracks: the line's is the sum of all that are drawn.
+    A track's density is divided by the number of tracks, so that the line's is the sum of all.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         The figure and the numbers in it.
     """
     n, seed = data.sizes["track"], int(data["seed_of_track"][0])
-    fig, panels = labels.response_panels(4.9)
+    fig, panels = labels.response_panels(data, 4.9)
     for response, axis, shown in panels:
         at = data.isel(response=response)
         value = shown.scale * at["value"].to_numpy()

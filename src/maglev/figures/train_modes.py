@@ -42,11 +42,11 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
         axis.plot(frequency[chosen], ratio[chosen], **look, label=word)
     named = np.flatnonzero(of_body)
     for number, k in enumerate(named, start=1):
-        place = (-9, -2.5) if number % 2 else (4.5, -2.5)
+        offset = (-9, -2.5) if number % 2 else (4.5, -2.5)
         axis.annotate(
             str(number),
             (frequency[k], ratio[k]),
-            xytext=place,
+            xytext=offset,
             textcoords="offset points",
             fontsize=7,
         )

@@ -9,9 +9,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from maglev.figures import curves, labels, style
-from maglev.vocabulary import METHODS, RESPONSES
 
 _SHOWN = ("girder_displacement_z", "girder_acceleration_z")
+"""The responses of the paper's figure; the first two of the files where they have not both."""
 
 
 def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure, xr.Dataset]:
@@ -20,7 +20,7 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
     Parameters
     ----------
     accuracy
-        Layout ``accuracy``: serves the designs made in one stage, by their first samples.
+        Layout ``accuracy``: for the designs made in one stage, by their first samples.
     designs
         Layout ``design``, of the methods of the same case.
 
@@ -29,7 +29,15 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
     figure, plotted
         The figure and the numbers in it.
     """
-    rows = [_rounds(accuracy, design) for design in designs]
+    responses = np.array(
+        [
+            name
+            for name in accuracy["response"].to_numpy()
+            if all(name in design["response"] for design in designs)
+        ]
+    )
+    accuracy = accuracy.sel(response=responses)
+    rows = [_rounds(accuracy, design.sel(response=responses)) for design in designs]
     longest = max(one[0].size for one in rows)
 
     def filled(k: int, nothing: float) -> np.ndarray:
@@ -53,11 +61,13 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
             "response": accuracy["response"],
         },
     )
-    fig, axes = style.panels(2, 2, style.PAGE, 4.6)
-    for column, name in enumerate(_SHOWN):
-        response = RESPONSES.index(name)
-        shown = labels.SHOWN[response]
-        upper, lower = axes[column], axes[2 + column]
+    names = responses.tolist()
+    chosen = _SHOWN if set(_SHOWN) <= set(names) else tuple(names[:2])
+    fig, axes = style.panels(2, len(chosen), style.PAGE, 4.6)
+    for column, name in enumerate(chosen):
+        response = names.index(name)
+        shown = labels.shown(name)
+        upper, lower = axes[column], axes[len(chosen) + column]
         for (n_runs, rmse, error), design in zip(rows, designs, strict=True):
             method = labels.method_of(design)
             look: style.Look = {
@@ -84,7 +94,7 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
         upper.set(yscale="log", ylabel=f"RMSE [{shown.unit}]")
         lower.set(yscale="log", ylabel="AE, largest of the next runs [σ]")
         lower.set_xlabel("number of training runs")
-        for axis, letter in ((upper, "ab"[column]), (lower, "cd"[column])):
+        for axis, letter in ((upper, "abcd"[column]), (lower, "abcd"[len(chosen) + column])):
             axis.set_xlim(0, 1.03 * max(one[0].max() for one in rows))
             style.titled(axis, letter, shown.name)
     style.below(fig, *axes[0].get_legend_handles_labels(), columns=len(designs))
@@ -94,7 +104,7 @@ def figure(accuracy: xr.Dataset, designs: Sequence[xr.Dataset]) -> tuple[Figure,
 def _rounds(accuracy: xr.Dataset, design: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Number of runs (round,), errors against the baseline and at the next runs of a design.
 
-    An error of a round is that of the predictions before it, so it stands at the number of runs
+    The error of a round is that of the predictions before it, and stands at the number of runs
     before it.
     """
     if design.sizes["round"] > 1:
@@ -102,7 +112,7 @@ def _rounds(accuracy: xr.Dataset, design: xr.Dataset) -> tuple[np.ndarray, np.nd
         error = design["error"].to_numpy()
         ahead = np.concatenate([error[1:], np.full_like(error[:1], np.nan)])
         return n_runs, design["rmse"].to_numpy(), ahead
-    row = accuracy["method"].to_numpy().tolist().index(METHODS.index(labels.method_of(design)))
+    row = accuracy["method"].to_numpy().tolist().index(labels.method_of(design))
     known = accuracy["step_n_runs"].to_numpy()[row] > 0
     of_method = accuracy.isel(method=row)
     n_runs, rmse, error = (

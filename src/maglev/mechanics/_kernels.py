@@ -1,8 +1,8 @@
 """Compiled: the passage of a row of samples, step by step.
 
 Kernels take arrays and floats, write where they are told and check nothing: `integrate` has
-checked.  All samples of a row share the train's place, the track and the matrices; only the gains
-differ.
+checked.  All samples of a row share the train's position and the matrices; gains
+and, where asked for, tracks differ.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from maglev.compiled import kernel
+from maglev.mechanics._comfort import empty_weighing, weigh
 from maglev.mechanics._magnets import attract, circuits_at_rest, empty_magnet
 from maglev.mechanics._records import (
     COMPLETED,
@@ -26,13 +27,13 @@ from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, sto
 
 @kernel()
 def at_rest(n_dof):
-    """Room for the motion of so many degrees of freedom."""
+    """Motion record of degrees of freedom at rest."""
     return Motion(zeros(n_dof), zeros(n_dof), zeros(n_dof), zeros(n_dof), zeros(n_dof))
 
 
 @kernel()
 def _straight_rails(spans):
-    """Room for the motion of all rails and the forces on them."""
+    """Record of straight, unloaded rails."""
     n = spans.n_spans * spans.stride
     shape = (3, n, LANES)
     return Rails(
@@ -42,9 +43,10 @@ def _straight_rails(spans):
 
 @kernel()
 def _new_watch(n_magnets, n_sections, n_responses):
-    """Room for what is remembered of the motions that are watched."""
+    """Empty memory of the watched responses."""
     return Watch(
         zeros(6),
+        zeros(4),
         zeros(4 * n_sections),
         zeros(2 * n_responses),
         zeros(n_magnets),
@@ -56,7 +58,7 @@ def _new_watch(n_magnets, n_sections, n_responses):
 
 @kernel()
 def _advance_train(vehicle, dt, train):
-    """Close the last step of the train and open the next.
+    """Finish the train's last velocity step and take its next displacement step.
 
     The velocity that the forces see is predicted from the last two accelerations.
     """
@@ -72,7 +74,7 @@ def _advance_train(vehicle, dt, train):
 
 @kernel()
 def _links(vehicle, train, scaled, pull):
-    """Put the forces of springs and dampers on the train."""
+    """Set the train's forces to those of its springs and dampers."""
     for k in range(vehicle.scaled_dof.size):
         i = entry(vehicle.scaled_dof, k)
         along = load(train.position, i) * entry(vehicle.scaled_stiffness, k)
@@ -93,7 +95,7 @@ def _links(vehicle, train, scaled, pull):
 
 @kernel()
 def _move_span(spans, span, begin, end, source, packed, motion):
-    """Motion (or its rate) of a span's rails from the relative motion of the coordinates."""
+    """Compute the motion of a span's rails, or its rate, from the relative coordinates."""
     at = span * spans.stride
     up, up_end = spans.upright_start[span], spans.upright_start[span + 1]
     out, out_end = spans.sideways_start[span], spans.sideways_start[span + 1]
@@ -108,7 +110,7 @@ def _move_span(spans, span, begin, end, source, packed, motion):
 
 @kernel()
 def _move_rails(spans, first, last, tail, nose, guideway, packed, rails):
-    """Motion and rate of the rails under the train; no force on them yet."""
+    """Compute motion and rate of the rails under the train, and clear the forces on them."""
     for span in range(first, last + 1):
         begin, end = _covered(spans, span, tail, nose)
         _move_span(spans, span, begin, end, guideway.position, packed, rails.motion)
@@ -121,7 +123,7 @@ def _move_rails(spans, first, last, tail, nose, guideway, packed, rails):
 
 @kernel()
 def _load_span(spans, span, begin, end, rails, turn, force):
-    """Add the forces on a span's rails to the coordinates that move them.
+    """Add the forces on a span's rails to the forces on its coordinates.
 
     Leaves the sum of right and left in ``rails.force[0]`` and the difference in ``turn``.
     """
@@ -138,13 +140,29 @@ def _load_span(spans, span, begin, end, rails, turn, force):
 
 
 @kernel()
-def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway):
-    """Put the forces on the rails under the train on the guideway.
+def _left_out_at_bearings(spans, begin, end, force, turn, across, at, watch):
+    """Opening of the middle span's bearings by its left-out modes."""
+    none = load(watch.bearing, 0) * 0.0
+    for side in range(2):
+        mean, half = none, none
+        for k in range(begin, end):
+            mean = fma(load(force, at + k), spans.bearing_rest[3 * side, k], mean)
+            half = fma(load(turn, k), spans.bearing_rest[3 * side + 1, k], half)
+            half = fma(load(across, at + k), spans.bearing_rest[3 * side + 2, k], half)
+        store(watch.bearing, 2 * side, mean)
+        store(watch.bearing, 2 * side + 1, half)
 
-    Returns the motion of midspan, z and y, that modes left out have under them.
+
+@kernel()
+def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway, watch):
+    """Transfer the forces on the rails under the train to the guideway's coordinates.
+
+    Returns the midspan displacement, z and y, that these forces cause in the left-out modes.
     """
     rest_z = load(guideway.position, 0) * 0.0
     rest_y = rest_z
+    for k in range(4):
+        store(watch.bearing, k, 0.0)
     for span in range(first, last + 1):
         begin, end = _covered(spans, span, tail, nose)
         _load_span(spans, span, begin, end, rails, turn, guideway.force)
@@ -154,12 +172,15 @@ def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway):
                 rest_z = fma(load(rails.force[0], at + k), spans.rest[0, k], rest_z)
                 rest_y = fma(load(turn, k), spans.rest[1, k], rest_y)
                 rest_y = fma(load(rails.force[2], at + k), spans.rest[2, k], rest_y)
+            _left_out_at_bearings(
+                spans, begin, end, rails.force[0], turn, rails.force[2], at, watch
+            )
     return rest_z, rest_y
 
 
 @kernel()
 def _still(stretches, stretch, guideway):
-    """Leave the coordinates alone that are no longer stepped: modes at rest."""
+    """Bring the coordinates that a new stretch no longer steps to rest."""
     for k in range(stretches.stilled_start[stretch], stretches.stilled_start[stretch + 1]):
         i = stretches.stilled[k]
         for state in guideway:
@@ -168,7 +189,7 @@ def _still(stretches, stretch, guideway):
 
 @kernel()
 def _advance_guideway(stretches, stretch, dt, guideway):
-    """As `_advance_train` for what is stepped of the guideway; leaves no accelerations."""
+    """Advance the stepped coordinates of the guideway as `_advance_train`; clear their forces."""
     half = 0.5 * dt
     for n in range(stretches.start[stretch], stretches.start[stretch + 1]):
         i = entry(stretches.stepped, n)
@@ -183,7 +204,7 @@ def _advance_guideway(stretches, stretch, dt, guideway):
 
 @kernel()
 def _answer(spans, stretch, guideway):
-    """Turn the forces on the coordinates that are stepped into accelerations, in place."""
+    """Turn the forces on the stepped coordinates into accelerations, in place."""
     x, velocity, force = guideway.position, guideway.predicted, guideway.force
     n_modes, stretches = spans.square.size, spans.stretches
     start, tops, stop = (
@@ -234,7 +255,7 @@ def _answer(spans, stretch, guideway):
 
 @kernel()
 def _covered(spans, span, tail, nose):
-    """Rows of a span's rail coefficients, from and to, of the units that the train is on."""
+    """First and last row of a span's rail coefficients on the units under the train."""
     per_unit = spans.stride // spans.n_units
     unit = spans.span_length / spans.n_units
     start = span * spans.span_length
@@ -245,36 +266,51 @@ def _covered(spans, span, tail, nose):
 
 
 @kernel()
-def _keep_extreme(outcome, place, value, time):
-    size = maximum(value, -1.0 * value)
+def _keep_largest(outcome, place, size, time):
     best = load(outcome.extreme, place)
     store(outcome.extreme_time, place, choose(size, best, time, load(outcome.extreme_time, place)))
     store(outcome.extreme, place, maximum(size, best))
 
 
 @kernel()
-def _keep_peak(outcome, watch, place, value, time, dt):
-    """Keep the size of a motion's largest peak, and when it was.
+def _peak(watch, place, value):
+    """Vertex of the parabola through a motion's last three values, and twice how far back it is.
 
-    A peak is the vertex of the parabola through three values in a row, of which the middle one is
-    the largest; the values themselves miss it by up to (ωΔt)²/8 of its size.
+    A peak is such a vertex of which the middle value is the largest; the values themselves miss it
+    by up to (ωΔt)²/8 of its size.  The way counts from the middle value [steps].
     """
     before, middle = load(watch.recent, 2 * place), load(watch.recent, 2 * place + 1)
     rise = value - before
-    # twice the way back from the middle to the vertex [steps]; beyond 1 another value is nearer
     back = rise / (value - middle - middle + before)
-    back = choose(1.0, maximum(back, -1.0 * back), back, 0.0)
-    _keep_extreme(
-        outcome, place, fma(rise * back, -0.125, middle), back * (-0.5 * dt) + (time - dt)
-    )
-    _keep_extreme(outcome, place, value, time)  # the last of all has none behind it
+    back = choose(1.0, maximum(back, -1.0 * back), back, 0.0)  # beyond 1 another value is nearer
     store(watch.recent, 2 * place, middle)
     store(watch.recent, 2 * place + 1, value)
+    return fma(rise * back, -0.125, middle), back
+
+
+@kernel()
+def _keep_peak(outcome, watch, place, value, time, dt):
+    """Keep the size of a motion's largest peak, and when it was; return the vertex of `_peak`."""
+    peak, back = _peak(watch, place, value)
+    when = back * (-0.5 * dt) + (time - dt)
+    _keep_largest(outcome, place, maximum(peak, -1.0 * peak), when)
+    # the last of all has none behind it
+    _keep_largest(outcome, place, maximum(value, -1.0 * value), time)
+    return peak
+
+
+@kernel()
+def _keep_signs(outcome, place, peak, value):
+    """Keep the largest of a motion in its direction, and the largest against it."""
+    up = maximum(maximum(peak, value), load(outcome.signed, 2 * place))
+    down = maximum(maximum(-1.0 * peak, -1.0 * value), load(outcome.signed, 2 * place + 1))
+    store(outcome.signed, 2 * place, up)
+    store(outcome.signed, 2 * place + 1, down)
 
 
 @kernel()
 def _low_pass(sections, direction, watch, incoming):
-    """Pass a motion of midspan through the low-pass on accelerations."""
+    """Filter an acceleration of midspan by the low-pass."""
     n_sections = sections.shape[0]
     for section in range(n_sections):
         b0, b1, b2, _, a1, a2 = sections[section]
@@ -287,13 +323,13 @@ def _low_pass(sections, direction, watch, incoming):
 
 
 @kernel()
-def _watch_midspan(spans, run, step, direction, rest, guideway, watch, outcome):
-    """Displacement of midspan, and its acceleration a step late.
+def _watch_midspan(spans, timing, step, direction, rest, guideway, watch, outcome):
+    """Record the displacement of midspan at this step and its acceleration at the step before.
 
-    What left-out modes add follows the forces at once; its acceleration, a second difference, is
-    that of the step before, and so is what it joins.
+    The left-out modes follow the forces at once.  Their acceleration is a second difference and
+    known one step late, so the acceleration of the kept modes waits for it.
     """
-    dt = run.time_step
+    dt = timing.time_step
     shift = rest * 0.0
     raw = shift
     n_columns = spans.output_column.size
@@ -309,11 +345,13 @@ def _watch_midspan(spans, run, step, direction, rest, guideway, watch, outcome):
     store(watch.left_out, 3 * direction, rest)
     store(watch.left_out, 3 * direction + 1, change)
     store(watch.left_out, 3 * direction + 2, raw)
-    smooth = _low_pass(run.sections, direction, watch, smooth)
+    smooth = _low_pass(timing.sections, direction, watch, smooth)
     time = step * dt
-    _keep_peak(outcome, watch, direction, shift, time, dt)
-    _keep_peak(outcome, watch, 2 + direction, smooth, time - dt, dt)
-    every = run.record_every
+    peak = _keep_peak(outcome, watch, direction, shift, time, dt)
+    _keep_signs(outcome, direction, peak, shift)
+    peak = _keep_peak(outcome, watch, 2 + direction, smooth, time - dt, dt)
+    _keep_signs(outcome, 2 + direction, peak, smooth)
+    every = timing.record_every
     if every > 0 and step % every == 0:
         store(outcome.history[step // every - 1], direction, shift)
         store(outcome.history[step // every - 1], 2 + direction, smooth)
@@ -323,46 +361,75 @@ def _watch_midspan(spans, run, step, direction, rest, guideway, watch, outcome):
 
 
 @kernel()
-def _watch_cars(vehicle, run, step, train, watch, outcome):
-    """Accelerations of the car bodies."""
-    dt = run.time_step
+def _watch_bearings(spans, timing, step, place, guideway, watch, outcome):
+    """Lift of the girder off the bearings of the middle span, the largest of the four."""
+    n_columns = spans.output_column.size
+    lift = load(watch.bearing, 0) * 0.0
+    for side in range(2):
+        mean, half = load(watch.bearing, 2 * side), load(watch.bearing, 2 * side + 1)
+        for k in range(n_columns):
+            motion = load(guideway.position, entry(spans.output_column, k))
+            mean = fma(motion, entry(spans.bearing, 2 * side * n_columns + k), mean)
+            half = fma(motion, entry(spans.bearing, (2 * side + 1) * n_columns + k), half)
+        higher = mean + maximum(half, -1.0 * half)
+        lift = higher if side == 0 else maximum(lift, higher)
+    time, dt = step * timing.time_step, timing.time_step
+    peak, back = _peak(watch, place, lift)
+    _keep_largest(outcome, place, peak, back * (-0.5 * dt) + (time - dt))
+    _keep_largest(outcome, place, lift, time)
+
+
+@kernel()
+def _watch_cars(vehicle, timing, step, train, watch, outcome):
+    """Accelerations of the car bodies, and the larger of those at their two ends.
+
+    Of ``up - arm turn`` and ``up + arm turn`` the larger size is ``|up| + arm |turn|``.
+    """
+    dt = timing.time_step
     n_cars = vehicle.body_z.size
-    record = run.record_every > 0 and step % run.record_every == 0
+    record = timing.record_every > 0 and step % timing.record_every == 0
     for car in range(n_cars):
         vertical, lateral = vehicle.body_z[car], vehicle.body_y[car]
         up = load(train.force, vertical) * vehicle.inverse_mass[vertical]
         across = load(train.force, lateral) * vehicle.inverse_mass[lateral]
         _keep_peak(outcome, watch, 4 + car, up, step * dt, dt)
         _keep_peak(outcome, watch, 4 + n_cars + car, across, step * dt, dt)
+        pitch, yaw = vehicle.body_pitch[car], vehicle.body_yaw[car]
+        turn = load(train.force, pitch) * (vehicle.inverse_mass[pitch] * vehicle.end_distance)
+        swing = load(train.force, yaw) * (vehicle.inverse_mass[yaw] * vehicle.end_distance)
+        end_z = maximum(up, -1.0 * up) + maximum(turn, -1.0 * turn)
+        end_y = maximum(across, -1.0 * across) + maximum(swing, -1.0 * swing)
+        _keep_peak(outcome, watch, 4 + 2 * n_cars + car, end_z, step * dt, dt)
+        _keep_peak(outcome, watch, 4 + 3 * n_cars + car, end_y, step * dt, dt)
         if record:
-            row = step // run.record_every - 1
+            row = step // timing.record_every - 1
             store(outcome.history[row], 4 + car, up)
             store(outcome.history[row], 4 + n_cars + car, across)
 
 
 @kernel()
-def _record_magnets(run, step, n_cars, watch, outcome):
-    """Mean gap and current of each magnet."""
-    row, at, n = step // run.record_every - 1, 4 + 2 * n_cars, watch.magnet_gap.shape[0]
+def _record_magnets(timing, step, n_cars, watch, outcome):
+    """Record mean gap and mean current of each magnet."""
+    row, at, n = step // timing.record_every - 1, 4 + 2 * n_cars, watch.magnet_gap.shape[0]
     for magnet in range(n):
         store(outcome.history[row], at + magnet, load(watch.magnet_gap, magnet))
         store(outcome.history[row], at + n + magnet, load(watch.magnet_current, magnet))
 
 
 @kernel()
-def _note_lost(run, watch, outcome, time):
-    """Name the samples whose levitation is lost at this step; return how many still hold."""
+def _note_lost(timing, watch, outcome, time):
+    """Set the status of samples that lose levitation at this step; return how many still hold."""
     holding = 0
     for lane in range(LANES):
         if outcome.status[lane] != COMPLETED:
             continue
         for magnet in range(watch.magnet_min.shape[0]):
             low, high = watch.magnet_min[magnet, lane], watch.magnet_max[magnet, lane]
-            if low > run.gap_contact and high < run.gap_lost:
+            if low > timing.gap_contact and high < timing.gap_lost:
                 continue
-            if low <= run.gap_contact:
+            if low <= timing.gap_contact:
                 outcome.status[lane] = CONTACT
-            elif high >= run.gap_lost:
+            elif high >= timing.gap_lost:
                 outcome.status[lane] = GAP_LOST
             else:
                 outcome.status[lane] = NOT_FINITE
@@ -379,20 +446,20 @@ def _note_lost(run, watch, outcome, time):
 
 
 @kernel()
-def _all_lost(run, watch, outcome, time):
-    """Look for gaps out of bounds at this step; return whether no sample holds any more."""
+def _all_lost(timing, watch, outcome, time):
+    """Check the gaps at this step; return whether all samples have lost levitation."""
     for lane in range(LANES):
         low = min(outcome.gap_min[0, lane], outcome.gap_min[1, lane])
         high = max(outcome.gap_max[0, lane], outcome.gap_max[1, lane])
-        if not (low > run.gap_contact and high < run.gap_lost):
-            return _note_lost(run, watch, outcome, time) == 0
+        if not (low > timing.gap_contact and high < timing.gap_lost):
+            return _note_lost(timing, watch, outcome, time) == 0
     return False
 
 
 @kernel(nogil=True)
-def passage(
-    vehicle, suspension, guidance, suspension_law, guidance_law, suspension_places,
-    guidance_places, spans, run, gains, outcome,
+def cross(
+    vehicle, suspension, guidance, suspension_law, guidance_law, suspension_footprints,
+    guidance_footprints, spans, timing, gains, outcome,
 ):  # fmt: skip
     """Take one row of samples over the guideway.
 
@@ -402,8 +469,8 @@ def passage(
     ----------
     vehicle, suspension, guidance, suspension_law, guidance_law
         The train, its magnets and their circuits.
-    suspension_places, guidance_places, spans, run
-        What the poles meet, the guideway and the passage.
+    suspension_footprints, guidance_footprints, spans, timing
+        The rail under the poles' faces, the guideway, and steps and bounds of the passage.
     gains : (8, LANES)
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d, suspension k_a [A s²/m],
         k_i [A/(m s)], guidance k_a, k_i.
@@ -411,7 +478,7 @@ def passage(
         Receives the results; extremes start at zero, gaps at the reference.
     """
     n_cars, n_magnets = vehicle.body_z.size, 2 * (suspension.x.size + guidance.x.size)
-    dt, stretches = run.time_step, spans.stretches
+    dt, stretches = timing.time_step, spans.stretches
     train = at_rest(vehicle.inverse_mass.size)
     guideway = at_rest(spans.square.size + spans.stiffness_start.size - 1)
     rails = _straight_rails(spans)
@@ -421,14 +488,16 @@ def passage(
     guiding = empty_magnet(guidance, guidance_law)
     lifting_circuits = circuits_at_rest(suspension, suspension_law)
     guiding_circuits = circuits_at_rest(guidance, guidance_law)
-    watch = _new_watch(n_magnets, run.sections.shape[0], outcome.extreme.shape[0])
+    watch = _new_watch(n_magnets, timing.sections.shape[0], outcome.extreme.shape[0])
+    weighing = empty_weighing(timing.comfort, n_cars)
+    with_magnets = timing.record_every > 0 and outcome.history.shape[1] > 4 + 2 * n_cars
     stretch = -1
-    for step in range(run.first_step, run.n_steps + 1):
-        nose = run.start + run.speed * (step * dt)
-        tail = nose - run.train_length
+    for step in range(timing.first_step, timing.n_steps + 1):
+        nose = timing.start + timing.speed * (step * dt)
+        tail = nose - timing.train_length
         first = max(0, int(np.floor(tail / spans.span_length)))
         last = min(spans.n_spans - 1, int(np.floor(nose / spans.span_length)))
-        record = run.record_every > 0 and step % run.record_every == 0
+        record = with_magnets and step % timing.record_every == 0
         _advance_train(vehicle, dt, train)
         while stretch + 1 < stretches.first_step.size and step >= stretches.first_step[stretch + 1]:
             stretch += 1
@@ -438,20 +507,24 @@ def passage(
         _move_rails(spans, first, last, tail, nose, guideway, packed, rails)
         _links(vehicle, train, scaled, pull)
         attract(
-            suspension_places, suspension, suspension_law, step, dt, gains, train, rails, lifting,
-            lifting_circuits, record, watch, outcome,
+            suspension_footprints, suspension, suspension_law, step, dt, gains, train, rails,
+            lifting, lifting_circuits, record, watch, outcome,
         )  # fmt: skip
         attract(
-            guidance_places, guidance, guidance_law, step, dt, gains, train, rails, guiding,
-            guiding_circuits, record, watch, outcome,
+            guidance_footprints, guidance, guidance_law, step, dt, gains, train, rails,
+            guiding, guiding_circuits, record, watch, outcome,
         )  # fmt: skip
-        rest_z, rest_y = _load_guideway(spans, first, last, tail, nose, rails, turn, guideway)
+        rest_z, rest_y = _load_guideway(
+            spans, first, last, tail, nose, rails, turn, guideway, watch
+        )
         if stretch >= 0:
             _answer(spans, stretch, guideway)
-        _watch_midspan(spans, run, step, 0, rest_z, guideway, watch, outcome)
-        _watch_midspan(spans, run, step, 1, rest_y, guideway, watch, outcome)
-        _watch_cars(vehicle, run, step, train, watch, outcome)
+        _watch_midspan(spans, timing, step, 0, rest_z, guideway, watch, outcome)
+        _watch_midspan(spans, timing, step, 1, rest_y, guideway, watch, outcome)
+        _watch_bearings(spans, timing, step, 4 + 4 * n_cars, guideway, watch, outcome)
+        _watch_cars(vehicle, timing, step, train, watch, outcome)
+        weigh(timing.comfort, vehicle, step, dt, train, weighing, outcome)
         if record:
-            _record_magnets(run, step, n_cars, watch, outcome)
-        if _all_lost(run, watch, outcome, step * dt):
+            _record_magnets(timing, step, n_cars, watch, outcome)
+        if _all_lost(timing, watch, outcome, step * dt):
             return

@@ -16,14 +16,14 @@ from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, min
 
 @kernel()
 def empty_magnet(rows, law):
-    """Room for one magnet."""
+    """Empty record of one magnet."""
     n = rows.offset.size
     return Magnet(zeros(n), zeros(n), zeros(n), zeros(n), zeros(law.n_circuits))
 
 
 @kernel()
 def circuits_at_rest(rows, law):
-    """Circuits whose current holds the train still."""
+    """Circuits at rest, with the currents that carry the train."""
     n = 2 * rows.x.size * law.n_circuits
     current, command = zeros(n), zeros(n)
     for k in range(n):
@@ -35,11 +35,11 @@ def circuits_at_rest(rows, law):
 
 
 @kernel()
-def _look(places, rows, law, row, side, step, train, rails, magnet):
-    """Gap error of each pole of a magnet, and its rate where a circuit is fed by it."""
+def _look(footprints, rows, law, row, side, step, train, rails, magnet):
+    """Compute the gap error of each pole of a magnet, and its rate where it feeds a circuit."""
     field = 2 if rows.is_guidance else side
     motion, motion_rate = rails.motion[field], rails.rate[field]
-    own_track = places.rail.shape[2] > 1
+    own_track = footprints.rail.shape[2] > 1
     translation, rotation = rows.translation[row, side], rows.rotation[row, side]
     shift, turn = load(train.position, translation), load(train.position, rotation)
     shift_rate = load(train.predicted, translation)
@@ -47,34 +47,34 @@ def _look(places, rows, law, row, side, step, train, rails, magnet):
     none = shift * 0.0
     n_poles = rows.offset.size
     for p in range(n_poles):
-        here = entry(places.number, row * n_poles + p) + step
+        here = entry(footprints.number, row * n_poles + p) + step
         at = 2 * here + side
         arm = entry(rows.arm, p)
-        first = entry(places.first, here)
-        begin, end = entry(places.start, here), entry(places.start, here + 1)
-        rail = load(places.rail, at) if own_track else none + entry(places.rail, at)
+        first = entry(footprints.first, here)
+        begin, end = entry(footprints.start, here), entry(footprints.start, here + 1)
+        rail = load(footprints.rail, at) if own_track else none + entry(footprints.rail, at)
         if entry(law.senses, p) > 0:
-            rise = load(places.ramp, at) if own_track else none + entry(places.ramp, at)
+            rise = load(footprints.ramp, at) if own_track else none + entry(footprints.ramp, at)
             for j in range(begin, end):
-                weight = entry(places.weight, j)
+                weight = entry(footprints.weight, j)
                 deflection = load(motion, first + j - begin)
                 rail = fma(deflection, weight, rail)
-                rise = fma(deflection, entry(places.rise, j), rise)
+                rise = fma(deflection, entry(footprints.rise, j), rise)
                 rise = fma(load(motion_rate, first + j - begin), weight, rise)
             store(magnet.rate, p, fma(turn_rate, arm, shift_rate) - rise)
         else:
             for j in range(begin, end):
-                rail = fma(load(motion, first + j - begin), entry(places.weight, j), rail)
+                rail = fma(load(motion, first + j - begin), entry(footprints.weight, j), rail)
         store(magnet.error, p, fma(turn, arm, shift) - rail)
 
 
 @kernel()
 def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
-    """Currents of a magnet's circuits: the law of control, its delay and its lag.
+    """Compute the currents of a magnet's circuits by the law of control, its delay and its lag.
 
-    ``u = k_p e + k_d de/dt + k_a a + k_i ∫e dt`` of the signal a delay ago is added to the current
-    at rest, kept within the chopper's reach, and followed with the lag (docs/theory/control.md,
-    eqs. 1 to 3).  The acceleration is that of the step before; `_answer_acceleration` mends it.
+    The delayed signal ``u = k_p e + k_d de/dt + k_a a + k_i ∫e dt`` is added to the current at
+    rest, limited to the chopper's range and passed through the lag (docs/theory/control.md,
+    eqs. 1 to 3).  The acceleration is that of the step before; `_answer_acceleration` corrects it.
     """
     kind = 1 if rows.is_guidance else 0
     sign = rows.outward[side]
@@ -143,7 +143,7 @@ def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
 
 @kernel()
 def _attract(rows, law, row, side, gains, magnet):
-    """Pull of each pole; return its sum and moment, the extreme gaps and the strongest current."""
+    """Compute the pull of each pole; return total, moment, extreme gaps and largest current."""
     sign = rows.outward[side]
     n_poles = rows.offset.size
     none = load(magnet.error, 0) * 0.0
@@ -179,9 +179,10 @@ def _attract(rows, law, row, side, gains, magnet):
 
 @kernel()
 def _answer_acceleration(rows, law, row, side, gains, train, magnet, circuits, force_z, force_turn):
-    """Let the pulls answer to the acceleration of this step, not of the last: one Newton step.
+    """Correct the pulls for the acceleration of this step by one Newton step.
 
-    Returns the forces on the magnet's two freedoms beyond those by the acceleration of the last.
+    `_control` knows only the acceleration of the step before.  Returns the additional forces on
+    the magnet's two degrees of freedom.
     """
     n_poles = rows.offset.size
     none = force_z * 0.0
@@ -221,30 +222,30 @@ def _answer_acceleration(rows, law, row, side, gains, train, magnet, circuits, f
 
 
 @kernel()
-def _press(places, rows, row, side, step, rails, magnet):
+def _press(footprints, rows, row, side, step, rails, magnet):
     """Spread the pulls over the rail under the poles' faces."""
     pressed = rails.force[2 if rows.is_guidance else side]
     n_poles = rows.offset.size
     for p in range(n_poles):
-        here = entry(places.number, row * n_poles + p) + step
-        first = entry(places.first, here)
-        begin, end = entry(places.start, here), entry(places.start, here + 1)
+        here = entry(footprints.number, row * n_poles + p) + step
+        first = entry(footprints.first, here)
+        begin, end = entry(footprints.start, here), entry(footprints.start, here + 1)
         pull = load(magnet.pull, p)
         for j in range(begin, end):
             at = first + j - begin
-            store(pressed, at, fma(pull, entry(places.weight, j), load(pressed, at)))
+            store(pressed, at, fma(pull, entry(footprints.weight, j), load(pressed, at)))
 
 
 @kernel()
 def attract(
-    places, rows, law, step, dt, gains, train, rails, magnet, circuits, keep, watch, outcome
+    footprints, rows, law, step, dt, gains, train, rails, magnet, circuits, keep, watch, outcome
 ):
-    """Close all magnets of one kind: gaps, currents, forces on train and rails.
+    """Compute gaps, currents and forces of all magnets of one kind, and load train and rails.
 
     Parameters
     ----------
-    places, rows, law
-        Where the poles are, the magnets, and how their circuits work.
+    footprints, rows, law
+        Rail under the poles' faces, the magnets, and their law of control.
     step, dt
         Number of the step and its length [s].
     gains : (8, LANES)
@@ -252,7 +253,7 @@ def attract(
     train, rails
         Their motion; receive the forces.
     magnet, circuits
-        Room for one magnet, and the state of all circuits of the kind.
+        Working record of one magnet, and the state of all circuits of the kind.
     keep
         Whether mean gaps and currents of each magnet are to be recorded.
     watch, outcome
@@ -267,7 +268,7 @@ def attract(
         for side in range(2):
             sign = rows.outward[side]
             translation, rotation = rows.translation[row, side], rows.rotation[row, side]
-            _look(places, rows, law, row, side, step, train, rails, magnet)
+            _look(footprints, rows, law, row, side, step, train, rails, magnet)
             _control(rows, law, row, side, step, dt, gains, train, magnet, circuits)
             total, moment, smallest, largest, strong = _attract(rows, law, row, side, gains, magnet)
             force = load(train.force, translation) - (total - rows.static_force[row, side] * sign)
@@ -279,7 +280,7 @@ def attract(
                 force, turn = force + more, turn + more_turn
             store(train.force, translation, force)
             store(train.force, rotation, turn)
-            _press(places, rows, row, side, step, rails, magnet)
+            _press(footprints, rows, row, side, step, rails, magnet)
             number = rows.number[row, side]
             store(watch.magnet_min, number, smallest)
             store(watch.magnet_max, number, largest)

@@ -10,21 +10,21 @@ from typing import NamedTuple
 import numpy as np
 
 COMPLETED, CONTACT, GAP_LOST, NOT_FINITE, STEP_TOO_LARGE = 0, 1, 2, 3, 4
-"""How a passage ended: the values of ``status`` [-]."""
+"""End of a passage: the values of ``status`` [-]."""
 
 
 class Vehicle(NamedTuple):
     """Train with open magnets; links in rows and columns of non-zero coefficients.
 
-    Springs and dampers of a kind pull by ``stiffness * x + damping * velocity`` of what they hang
-    on; each degree of freedom is scaled so once for every kind of link that it meets.
+    A link pulls by ``stiffness * x + damping * velocity`` of its degrees of freedom; this sum is
+    formed once for each degree of freedom and kind of link.
     """
 
     inverse_mass: np.ndarray  # (dof,)
     scaled_dof: np.ndarray  # (scaled,) degree of freedom
     scaled_stiffness: np.ndarray  # (scaled,)
     scaled_damping: np.ndarray  # (scaled,)
-    link_start: np.ndarray  # (link + 1,) what pulls in a link
+    link_start: np.ndarray  # (link + 1,) first scaled degree of freedom of each link
     link_scaled: np.ndarray  # (non-zero,)
     link_coefficient: np.ndarray  # (non-zero,)
     pull_start: np.ndarray  # (dof + 1,) the links that pull at a degree of freedom
@@ -32,13 +32,16 @@ class Vehicle(NamedTuple):
     pull_coefficient: np.ndarray  # (non-zero,)
     body_z: np.ndarray  # (car,) degree of freedom
     body_y: np.ndarray  # (car,)
+    body_pitch: np.ndarray  # (car,)
+    body_yaw: np.ndarray  # (car,)
+    end_distance: float  # of the ends of a car body's floor from its centre [m]
 
 
 class MagnetRows(NamedTuple):
-    """Magnets of one kind, right and left at the same place."""
+    """Magnets of one kind in rows, the right and the left one at the same x."""
 
     x: np.ndarray  # (row,) centre relative to the nose [m]
-    number: np.ndarray  # (row, side) place in the train's table of magnets
+    number: np.ndarray  # (row, side) row in the train's table of magnets
     translation: np.ndarray  # (row, side) degree of freedom
     rotation: np.ndarray  # (row, side)
     static_force: np.ndarray  # (row, side) [N]
@@ -56,7 +59,7 @@ class MagnetRows(NamedTuple):
 
 
 class Law(NamedTuple):
-    """How the circuits of one kind of magnet make currents of gaps."""
+    """Law of control of one kind of magnet: from gaps to currents."""
 
     n_circuits: int  # of one magnet
     own_gap: bool  # every pole has a circuit that its own gap feeds
@@ -81,7 +84,7 @@ class Law(NamedTuple):
 
 
 class Circuits(NamedTuple):
-    """State of the circuits of one kind, those of a magnet next to each other."""
+    """State of the circuits of one kind; those of a magnet are adjacent."""
 
     current: np.ndarray  # (circuit, LANES) [A]
     command: np.ndarray  # (circuit, LANES) at the step before [A]
@@ -91,7 +94,7 @@ class Circuits(NamedTuple):
 
 
 class Magnet(NamedTuple):
-    """One magnet at one step: what its poles and circuits see and do."""
+    """One magnet at one step: gap errors and pulls of its poles, currents of its circuits."""
 
     error: np.ndarray  # (pole, LANES) gap error, in the direction of the displacement [m]
     rate: np.ndarray  # (pole, LANES) [m/s]
@@ -111,7 +114,7 @@ class Motion(NamedTuple):
 
 
 class Rails(NamedTuple):
-    """Coefficients of the rails' motion: right z, left z, y; those of a span next to each other."""
+    """Coefficients of the rails' motion (right z, left z, y); those of a span are adjacent."""
 
     motion: np.ndarray  # (field, coefficient, LANES)
     rate: np.ndarray  # (field, coefficient, LANES)
@@ -119,9 +122,10 @@ class Rails(NamedTuple):
 
 
 class Watch(NamedTuple):
-    """What is remembered of the motions that are watched."""
+    """Memory of the watched responses: filter states, last values, gaps and currents."""
 
     left_out: np.ndarray  # (6, LANES) midspan by left-out modes, its change, acceleration; z, y
+    bearing: np.ndarray  # (4, LANES) opening of the bearings by left-out modes, as `Spans.bearing`
     filtered: np.ndarray  # (4 section, LANES) state of the low-pass
     recent: np.ndarray  # (2 response, LANES) last two values of each response
     magnet_min: np.ndarray  # (magnet, LANES) smallest gap of each magnet at this step [m]
@@ -130,8 +134,25 @@ class Watch(NamedTuple):
     magnet_current: np.ndarray  # (magnet, LANES) [A]
 
 
+class Comfort(NamedTuple):
+    """Weightings of the accelerations at the ends of the car bodies, and when they are read."""
+
+    every: int  # steps between two readings
+    start: np.ndarray  # (weighting + 1,) into the sections; vertical and lateral in turns
+    sections: np.ndarray  # (section, 6)
+    first: np.ndarray  # (car,) step of the first reading that counts
+    last: np.ndarray  # (car,) step of the last
+
+
+class Weighing(NamedTuple):
+    """State of the filters of all cars."""
+
+    velocity: np.ndarray  # (4 car, LANES) z, pitch, y, yaw of each body at the last reading
+    filtered: np.ndarray  # (2 section of every end, LANES)
+
+
 class Stretches(NamedTuple):
-    """What is stepped of the guideway when: stretches of a passage, and the rows they step with.
+    """Stretches of a passage: the coordinates stepped in each, and the rows of their matrices.
 
     Before the first stretch the guideway rests.
     """
@@ -155,8 +176,8 @@ class Stretches(NamedTuple):
 class Spans(NamedTuple):
     """Guideway in component coordinates: modes of spans, modes of piers, pier tops.
 
-    A mode counts from where the pier tops would take it if it were rigid.  While the train is where
-    it is, only the coordinates of a stretch are stepped; the other modes follow the pier tops.
+    The coordinate of a mode is its motion relative to the pier tops.  In each stretch of a passage
+    only some coordinates are stepped; the other modes follow the pier tops.
     """
 
     n_spans: int
@@ -187,40 +208,47 @@ class Spans(NamedTuple):
     midspan: np.ndarray  # (2, output column) z and y
     middle: int  # span that midspan is of
     rest: np.ndarray  # (3, stride) midspan z by z, y by roll and y of its left-out modes [m/N]
+    bearing: np.ndarray  # (4, output column) opening at the first end, mean and half difference of
+    # right and left, then at the last
+    bearing_rest: np.ndarray  # (6, stride) at each end mean by z, half difference by roll and y
 
 
-class Places(NamedTuple):
-    """What a pole's face meets at every place it can be at after a whole number of steps."""
+class Footprints(NamedTuple):
+    """Rail under a pole's face, wherever the face can be after a whole number of steps."""
 
-    number: np.ndarray  # (row, pole) place at time zero; each step moves on by one
-    first: np.ndarray  # (place,) first of the rail coefficients under the face
-    start: np.ndarray  # (place + 1,) of their weights; none off the guideway
+    number: np.ndarray  # (row, pole) footprint at time zero; each step moves on by one
+    first: np.ndarray  # (footprint,) first of the rail coefficients under the face
+    start: np.ndarray  # (footprint + 1,) of their weights; none off the guideway
     weight: np.ndarray  # of the coefficients in the rail's mean motion under the face
     rise: np.ndarray  # of the coefficients in the mean rate over a step as the pole moves on [1/s]
-    rail: np.ndarray  # (place, side, 1 or LANES) irregularity of all samples, or of each [m]
-    ramp: np.ndarray  # (place, side, 1 or LANES) its rate at the pole [m/s]
+    rail: np.ndarray  # (footprint, side, 1 or LANES) irregularity of all samples, or of each [m]
+    ramp: np.ndarray  # (footprint, side, 1 or LANES) its rate at the pole [m/s]
 
 
-class Run(NamedTuple):
-    """One passage and how it is watched."""
+class Timing(NamedTuple):
+    """Steps and speed of a passage, bounds of the gaps, and how responses are watched."""
 
     first_step: int  # until then the train rests
     n_steps: int
     time_step: float
     speed: float
-    start: float  # place of the nose at time zero [m]
+    start: float  # position of the nose at time zero [m]
     train_length: float
     gap_contact: float
     gap_lost: float
     sections: np.ndarray  # (section, 6) low-pass on guideway accelerations
     record_every: int  # steps between recorded rows; zero: none
+    comfort: Comfort
 
 
 class Outcome(NamedTuple):
-    """What one row of samples leaves behind."""
+    """Results of one row of samples."""
 
-    extreme: np.ndarray  # (4 + 2 car, LANES) girder z, y, acceleration z, y; bodies' z; bodies' y
+    extreme: np.ndarray  # (5 + 4 car, LANES) girder z, y, acceleration z, y; bodies' z; bodies' y;
+    # their ends' z; ends' y; lift off the bearings
     extreme_time: np.ndarray  # same
+    signed: np.ndarray  # (8, LANES) girder's largest positive and largest negative, in turns
+    squares: np.ndarray  # (2 car weighting, LANES) sum of weighted accelerations squared
     gap_min: np.ndarray  # (kind, LANES)
     gap_max: np.ndarray
     current_max: np.ndarray

@@ -23,16 +23,16 @@ def zeros(n_rows):
 
 
 @kernel()
-def weighted_sum(coefficients, places, start, stop, source, total):
-    """``total + Σ_k coefficients[k] source[places[k]]`` for ``start`` ≤ k < ``stop``."""
+def weighted_sum(coefficients, columns, start, stop, source, total):
+    """``total + Σ_k coefficients[k] source[columns[k]]`` for ``start`` ≤ k < ``stop``."""
     for k in range(start, stop):
-        total = fma(load(source, entry(places, k)), entry(coefficients, k), total)
+        total = fma(load(source, entry(columns, k)), entry(coefficients, k), total)
     return total
 
 
 @kernel()
 def gather(source, columns, start, stop, packed, first):
-    """``packed[first + m] = source[columns[start + m]]``: products then read rows in a row."""
+    """``packed[first + m] = source[columns[start + m]]``, so that products read adjacent rows."""
     for m in range(start, stop):
         store(packed, first + m - start, load(source, entry(columns, m)))
 
@@ -41,21 +41,21 @@ def gather(source, columns, start, stop, packed, first):
 def transform(matrix, start, stop, packed, at, left, right, target, first):
     """``target[first + k] = Σ_m matrix[start + m, k] packed[at + m]`` for ``left`` ≤ k < ``right``.
 
-    As many rows at once as there are registers; the order of a sum does not depend on it.
+    As many rows are computed at once as there are registers; the order of each sum is the same.
     """
     none = load(packed, at) * 0.0
     width = matrix.shape[1]
     k = left
     while WIDE and k + 4 <= right:
         a, b, c, d = none, none, none, none
-        place = start * width + k
+        index = start * width + k
         for m in range(at, at + stop - start):
             one = load(packed, m)
-            a = fma(one, entry(matrix, place), a)
-            b = fma(one, entry(matrix, place + 1), b)
-            c = fma(one, entry(matrix, place + 2), c)
-            d = fma(one, entry(matrix, place + 3), d)
-            place += width
+            a = fma(one, entry(matrix, index), a)
+            b = fma(one, entry(matrix, index + 1), b)
+            c = fma(one, entry(matrix, index + 2), c)
+            d = fma(one, entry(matrix, index + 3), d)
+            index += width
         store(target, first + k, a)
         store(target, first + k + 1, b)
         store(target, first + k + 2, c)
@@ -63,12 +63,12 @@ def transform(matrix, start, stop, packed, at, left, right, target, first):
         k += 4
     while k < right:
         a, b = none, none
-        place = start * width + k
+        index = start * width + k
         for m in range(at, at + stop - start):
             one = load(packed, m)
-            a = fma(one, entry(matrix, place), a)
-            b = fma(one, entry(matrix, place + 1), b)
-            place += width
+            a = fma(one, entry(matrix, index), a)
+            b = fma(one, entry(matrix, index + 1), b)
+            index += width
         store(target, first + k, a)
         store(target, first + k + 1, b)
         k += 2
@@ -78,9 +78,9 @@ def transform(matrix, start, stop, packed, at, left, right, target, first):
 def transform_both(
     mean, up, up_end, turn, out, out_end, packed, left, right, right_rail, left_rail, first
 ):
-    """Motion of both rails from that of their mean and the roll, each as by `transform`.
+    """Motion of both rails from that of their mean and the roll, each computed as by `transform`.
 
-    ``packed`` holds what moves the mean, then what rolls it.
+    ``packed`` holds the coordinates of the mean, then those of the roll.
     """
     n = up_end - up
     none = load(packed, 0) * 0.0
@@ -89,22 +89,22 @@ def transform_both(
     while WIDE and k + 4 <= right:
         a, b, c, d = none, none, none, none
         e, f, g, h = none, none, none, none
-        place = up * width + k
+        index = up * width + k
         for m in range(n):
             one = load(packed, m)
-            a = fma(one, entry(mean, place), a)
-            b = fma(one, entry(mean, place + 1), b)
-            c = fma(one, entry(mean, place + 2), c)
-            d = fma(one, entry(mean, place + 3), d)
-            place += width
-        place = out * width + k
+            a = fma(one, entry(mean, index), a)
+            b = fma(one, entry(mean, index + 1), b)
+            c = fma(one, entry(mean, index + 2), c)
+            d = fma(one, entry(mean, index + 3), d)
+            index += width
+        index = out * width + k
         for m in range(n, n + out_end - out):
             one = load(packed, m)
-            e = fma(one, entry(turn, place), e)
-            f = fma(one, entry(turn, place + 1), f)
-            g = fma(one, entry(turn, place + 2), g)
-            h = fma(one, entry(turn, place + 3), h)
-            place += width
+            e = fma(one, entry(turn, index), e)
+            f = fma(one, entry(turn, index + 1), f)
+            g = fma(one, entry(turn, index + 2), g)
+            h = fma(one, entry(turn, index + 3), h)
+            index += width
         store(right_rail, first + k, a + e)
         store(left_rail, first + k, a - e)
         store(right_rail, first + k + 1, b + f)
@@ -116,18 +116,18 @@ def transform_both(
         k += 4
     while k < right:
         a, b, e, f = none, none, none, none
-        place = up * width + k
+        index = up * width + k
         for m in range(n):
             one = load(packed, m)
-            a = fma(one, entry(mean, place), a)
-            b = fma(one, entry(mean, place + 1), b)
-            place += width
-        place = out * width + k
+            a = fma(one, entry(mean, index), a)
+            b = fma(one, entry(mean, index + 1), b)
+            index += width
+        index = out * width + k
         for m in range(n, n + out_end - out):
             one = load(packed, m)
-            e = fma(one, entry(turn, place), e)
-            f = fma(one, entry(turn, place + 1), f)
-            place += width
+            e = fma(one, entry(turn, index), e)
+            f = fma(one, entry(turn, index + 1), f)
+            index += width
         store(right_rail, first + k, a + e)
         store(left_rail, first + k, a - e)
         store(right_rail, first + k + 1, b + f)
@@ -143,13 +143,13 @@ def project(matrix, columns, start, stop, left, right, source, first, target):
     while WIDE and m + 4 <= stop:
         a, b = load(target, entry(columns, m)), load(target, entry(columns, m + 1))
         c, d = load(target, entry(columns, m + 2)), load(target, entry(columns, m + 3))
-        place = m * width
+        index = m * width
         for k in range(left, right):
             one = load(source, first + k)
-            a = fma(one, entry(matrix, place + k), a)
-            b = fma(one, entry(matrix, place + width + k), b)
-            c = fma(one, entry(matrix, place + 2 * width + k), c)
-            d = fma(one, entry(matrix, place + 3 * width + k), d)
+            a = fma(one, entry(matrix, index + k), a)
+            b = fma(one, entry(matrix, index + width + k), b)
+            c = fma(one, entry(matrix, index + 2 * width + k), c)
+            d = fma(one, entry(matrix, index + 3 * width + k), d)
         store(target, entry(columns, m), a)
         store(target, entry(columns, m + 1), b)
         store(target, entry(columns, m + 2), c)
@@ -157,11 +157,11 @@ def project(matrix, columns, start, stop, left, right, source, first, target):
         m += 4
     while m + 2 <= stop:
         a, b = load(target, entry(columns, m)), load(target, entry(columns, m + 1))
-        place = m * width
+        index = m * width
         for k in range(left, right):
             one = load(source, first + k)
-            a = fma(one, entry(matrix, place + k), a)
-            b = fma(one, entry(matrix, place + width + k), b)
+            a = fma(one, entry(matrix, index + k), a)
+            b = fma(one, entry(matrix, index + width + k), b)
         store(target, entry(columns, m), a)
         store(target, entry(columns, m + 1), b)
         m += 2

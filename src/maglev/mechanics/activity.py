@@ -1,9 +1,9 @@
 """Active coordinates of the guideway: the spans near the train are stepped, the others rest.
 
 Spans under the train and their neighbours are awake: all of their coordinates are stepped, as are
-those of the middle span, which is watched.  Other spans are quiet.  Piers pass motion on along the
-guideway, so that quiet spans do not rest: their pier tops and low modes are stepped; their other
-modes follow the pier tops without a motion of their own.  Damping between a mode that a quiet span
+those of the middle span, which is watched.  Other spans are quiet.  Piers carry motion along the
+guideway, so quiet spans do not rest: their pier tops and low modes are stepped; their other modes
+follow the pier tops without a motion of their own.  Damping between a mode that a quiet span
 keeps and one that its neighbour alone steps acts on the latter only.
 """
 
@@ -48,7 +48,7 @@ class Stretch:
 
 
 def stretches(config: Config, reduced: ReducedGuideway) -> list[Stretch]:
-    """Divide a passage into stages, from the step on which the nose reaches the guideway.
+    """Divide a passage into stretches, from the step on which the nose reaches the guideway.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def stretches(config: Config, reduced: ReducedGuideway) -> list[Stretch]:
     Returns
     -------
     stretches
-        In order; what is awake or stepped differs from each to the next.
+        In order; neighbours differ in the coordinates that are awake or stepped.
     """
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
     way = course(config)
@@ -128,9 +128,8 @@ def stepped_mass(
 ) -> tuple[IntArray, FloatArray]:
     """Active pier tops, and the lower Cholesky factor of their mass in a step.
 
-    Modes that are not stepped follow the tops with their mass.  A share Δt²/12 of the stiffness
-    does for the tops what its response does for a mode: swings of their own keep their period to
-    fourth order.
+    Modes that are not stepped add their mass to the tops that they follow.  A share Δt²/12 of the
+    stiffness is added to the mass, so that the periods of the tops are right to fourth order.
 
     Parameters
     ----------
@@ -144,7 +143,7 @@ def stepped_mass(
     Returns
     -------
     tops : (stepped top,)
-        Coordinates, those that meet next to each other.
+        Coordinates; coupled ones are adjacent.
     factor : (stepped top, stepped top)
         Lower triangular.
 

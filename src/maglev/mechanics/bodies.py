@@ -1,7 +1,7 @@
 """Rigid bodies with small rotations and the spring-damper links between them.
 
-A body is the set of its degrees of freedom; a place on it moves by a linear combination of them.
-A link is a combination that strains it, with a stiffness and a damping.  Theory:
+A body is the set of its degrees of freedom; a point of it moves by a linear combination of them.
+A link is a linear combination, its strain, with a stiffness and a damping.  Theory:
 docs/theory/train.md.
 """
 
@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from maglev.arrays import FloatArray
 
 Motion = Mapping[int, float]
-"""Motion of a place in one direction: metres (or radians) per unit of each degree of freedom."""
+"""Motion of a point in one direction: metres (or radians) per unit of each degree of freedom."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,21 +34,21 @@ class Body:
     psi: int | None = None
 
     def lateral(self, dx: float, dz: float) -> Motion:
-        """Motion in y of the place ``dx`` ahead of and ``dz`` below the centre [m].
+        """Motion in y of the point ``dx`` ahead of and ``dz`` below the centre [m].
 
         u_y = y - phi dz + psi dx.
         """
         return _combination((self.y, 1.0), (self.phi, -dz), (self.psi, dx))
 
     def vertical(self, dx: float, dy: float) -> Motion:
-        """Motion in z of the place ``dx`` ahead of and ``dy`` to the right of the centre [m].
+        """Motion in z of the point ``dx`` ahead of and ``dy`` to the right of the centre [m].
 
         u_z = z + phi dy - theta dx.
         """
         return _combination((self.z, 1.0), (self.phi, dy), (self.theta, -dx))
 
     def roll(self) -> Motion:
-        """Rotation about x of every place on it."""
+        """Rotation about x."""
         return _combination((self.phi, 1.0))
 
 
@@ -59,7 +59,7 @@ class Link:
     Attributes
     ----------
     motion
-        What strains the link: stretch [m] or twist [rad] per unit of each degree of freedom.
+        Strain of the link: stretch [m] or twist [rad] per unit of each degree of freedom.
     stiffness
         [N/m] or [N m/rad].
     damping
@@ -72,7 +72,13 @@ class Link:
 
 
 def relative(first: Motion, second: Motion) -> Motion:
-    """Relative motion ``first - second``, such as that of a magnet's end against its C-frame."""
+    """Relative motion ``first - second``, such as that of a magnet's end against its C-frame.
+
+    Examples
+    --------
+    >>> relative({0: 1.0, 2: 0.5}, {0: 1.0, 1: 1.0})  # what both share drops out
+    {2: 0.5, 1: -1.0}
+    """
     return _combination(*first.items(), *((dof, -value) for dof, value in second.items()))
 
 
@@ -90,6 +96,12 @@ def link_rows(links: Iterable[Link], n_dof: int) -> sp.csr_array:
     -------
     rows : (link, dof)
         Stretch [m] or twist [rad] per displacement [m] or rotation [rad].
+
+    Examples
+    --------
+    >>> spring = Link({0: 1.0, 1: -1.0}, stiffness=2.0, damping=0.0)
+    >>> link_rows([spring], n_dof=3).toarray()
+    array([[ 1., -1.,  0.]])
     """
     motions = [link.motion for link in links]
     row = np.repeat(np.arange(len(motions)), [len(motion) for motion in motions])
@@ -112,6 +124,13 @@ def assembled(rows: sp.csr_array, coefficient: FloatArray) -> sp.csr_array:
     -------
     matrix : (dof, dof)
         Stiffness or damping matrix; its pattern holds no explicit zeros.
+
+    Examples
+    --------
+    >>> spring = Link({0: 1.0, 1: -1.0}, stiffness=2.0, damping=0.0)
+    >>> assembled(link_rows([spring], n_dof=2), [spring.stiffness]).toarray()
+    array([[ 2., -2.],
+           [-2.,  2.]])
     """
     matrix = sp.csr_array(rows.T @ sp.diags_array(coefficient) @ rows)
     matrix.eliminate_zeros()

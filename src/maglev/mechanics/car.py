@@ -1,7 +1,7 @@
 """One car: its bodies, their masses and the links between them, 101 degrees of freedom.
 
-Places are measured from the car's centre at deck level: x ahead, y to the right, z down.  C-frames
-and bogies are counted from the front.  Theory: docs/theory/train.md.
+Positions are measured from the car's centre at deck level: x ahead, y to the right, z down.
+C-frames and bogies are counted from the front.  Theory: docs/theory/train.md.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Lump:
     y, z
         Place right of the centre line (and left of it) and below deck level [m].
     lateral, vertical
-        Whether it moves with the C-frame in that direction, or has a freedom of its own.
+        Whether it follows the C-frame in that direction; else it has its own degree of freedom.
     """
 
     mass: float
@@ -107,8 +107,8 @@ class HungMagnet:
     side
         `RIGHT` or `LEFT`.
     station
-        C-frame of its car that its front end hangs on: 0 on the first (and second), 7 on the last
-        (and the first of the next car).
+        C-frame that carries its front end: 0 for a magnet between the first and the second, 7 for
+        one between the last and the first of the next car.
     translation_dof, rotation_dof
         Indices of z and theta, or y and psi.
     """
@@ -140,7 +140,7 @@ class Car:
 
 
 def station_x(train: Train) -> tuple[float, ...]:
-    """Places of a car's eight C-frames ahead of its centre, from the front [m]."""
+    """Positions of a car's eight C-frames ahead of its centre, from the front [m]."""
     spacing = train.bogie.c_frame_spacing
     return tuple((0.5 * (N_C_FRAMES - 1) - k) * spacing for k in range(N_C_FRAMES))
 
@@ -223,7 +223,7 @@ def add_magnet(
     is_guidance, side, station
         Which magnet, see `HungMagnet`.
     front, rear
-        The C-frames its ends hang on.
+        The C-frames that carry its ends.
 
     Returns
     -------
@@ -270,7 +270,7 @@ def _magnet_against_c_frame(
 
 
 def _lumps(train: Train, n_ends: int) -> tuple[Lump, ...]:
-    """Masses that ride on a C-frame besides its own.
+    """Masses on a C-frame besides its own.
 
     Parameters
     ----------
@@ -293,9 +293,10 @@ def _add_bogie(
 ) -> tuple[CFrame, CFrame]:
     """Add a bogie and the masses on it; return front and rear C-frame.
 
-    Half of its own mass is at either C-frame, at deck level.  Rods ride at their pivots, magnets
-    with half their mass at each end in every direction in which they have no freedom; none has one
-    along travel.  About the centres of mass of each direction the products of inertia vanish.
+    Half of its own mass is at either C-frame, at deck level.  Rods add their mass at their pivots,
+    magnets half their mass at each end, in every direction in which they have no degree of freedom
+    of their own (along travel, none has).  About the centre of mass of each direction the products
+    of inertia vanish.
     """
     p = train.bogie
     arms = (0.5 * p.c_frame_spacing, -0.5 * p.c_frame_spacing)

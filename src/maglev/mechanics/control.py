@@ -28,7 +28,7 @@ class Grouping:
     drive : (pole, circuit)
         Weight of each circuit's current in the current of a pole [-]; rows sum to one.
     mean_gap_force
-        Whether the forces go by the mean gap of the magnet instead of each pole's own.
+        Whether a pole's force follows from the mean gap of the magnet instead of its own.
     """
 
     feed: FloatArray
@@ -92,11 +92,11 @@ class LateCurrent:
     Attributes
     ----------
     behind
-        Steps back to the latest of the three signals that a delayed one is taken from.
+        Steps back to the latest of the three signals that a delayed one is interpolated from.
     delayed : (3,)
-        Their weights, those of a parabola through them [-].
+        Weights of the three, by a parabola through them [-].
     decay, now, before
-        Weights of a lag that follows a command exactly if that is linear within a step [-].
+        Weights of the lag, exact for a command that is linear within a step [-].
     """
 
     behind: int

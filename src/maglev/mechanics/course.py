@@ -1,4 +1,4 @@
-"""Course of a run: start, end, time step, and the stretch of track under the train."""
+"""Course of a passage: start, end, time step, and the stretch of track under the train."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ from maglev.arrays import FloatArray
 from maglev.parameters import Config, Magnet
 
 JOINT_SHARE = 0.5
-"""Where in a step poles meet the joints of the rails [-].  Their force jumps there, which costs an
-error of first order unless it falls half-way between two steps (docs/theory/integration.md)."""
+"""Share of a step at which poles meet the joints of the rails [-].
+
+Their force jumps there, which is an error of first order unless the jump falls half-way between two
+steps (docs/theory/integration.md).
+"""
 
 
 @dataclass(frozen=True)
 class Course:
-    """The run of a train from start to end, in steps.
+    """Motion of the train from start to end of a passage, in steps.
 
     Attributes
     ----------
@@ -33,7 +36,7 @@ class Course:
     first_step
         Number of the first step on which anything moves [-].  Until the nose reaches the
         irregularity, or without one the guideway, the train rests in its equilibrium over rigid
-        straight track: nothing need be computed.
+        straight track, and the steps are skipped.
     """
 
     time_step: float
@@ -62,9 +65,9 @@ def course(config: Config) -> Course:
 
     A pole enters each span with a kink in its force, and poles follow one another at the rate
     v / pole pitch.  A step that divides this period keeps all harmonics of pole passing where they
-    are; any other folds them into the band of the responses.  Poles of suspension and guidance
-    magnets, which stand half a pitch apart, are to meet the joints at the same share of a step:
-    then the step divides the period an even number of times.
+    are; any other step folds them into the band of the responses.  Poles of suspension and guidance
+    magnets stand half a pitch apart; to meet the joints at the same share of a step, the period
+    then has an even number of steps.
 
     The train starts less than a step before ``passage.approach``, so that the poles of the
     suspension meet the joints of the rails, at whole units from the first pier, at `JOINT_SHARE` of

@@ -71,12 +71,12 @@ class BeamLine:
 
 @dataclass(frozen=True)
 class GuidewayModel:
-    """Matrices of the guideway, and rows that give its motion at any place along it.
+    """Matrices of the guideway, and rows of its motion at any position along it.
 
     Attributes
     ----------
     parameters
-        What it was built from.
+        Parameters of the guideway.
     mass, stiffness : csr (dof, dof)
         Of beams, connectors and bearings, after elimination of rigid arms and pier feet
         [kg, kg m, kg m^2] and [N/m, N, N m].  Symmetric and positive definite.
@@ -89,9 +89,9 @@ class GuidewayModel:
     pier_dof : tuple of (dof of a pier,)
         Degrees of freedom of each pier below its top.
     component : (dof,)
-        Which motion a degree of freedom is: 0 … 5 for x, y, z, φ, θ, ψ.
+        Direction of each degree of freedom: 0 … 5 for x, y, z, φ, θ, ψ.
     place : (dof, 3)
-        Where its node lies [m]: x from the first pier, y, and z below the girder axis.
+        Position of its node [m]: x from the first pier, y, and z below the girder axis.
     rail_lines
         The right and the left rail.
     girder_line
@@ -118,12 +118,12 @@ class GuidewayModel:
     def rail_rows(
         self, x: npt.ArrayLike, side: int
     ) -> tuple[sparse.csr_array, sparse.csr_array, sparse.csr_array, sparse.csr_array]:
-        """Rows that give the motion of a rail's axis; their transposes apply loads to it.
+        """Rows of the motion of a rail's axis; their transposes apply loads to it.
 
         Parameters
         ----------
         x : (point,)
-            Places along the guideway [m], 0 at the first pier.  At the joint of two units the one
+            Places along the guideway [m], 0 at the first pier.  At the joint of two units the unit
             ahead counts; outside the guideway the rows are zero.
         side
             `RIGHT` or `LEFT`.
@@ -145,7 +145,7 @@ class GuidewayModel:
     def rail_section_rows(
         self, x: npt.ArrayLike, side: int
     ) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Rows that give the rotation of a rail's section, shear left out.
+        """Rows of the rotation of a rail's section, without shear.
 
         Parameters
         ----------
@@ -155,7 +155,7 @@ class GuidewayModel:
         Returns
         -------
         turn_z, turn_y : csr (point, dof)
-            Slope of the section in the vertical and in the lateral plane, positive where it lifts
+            Slope of the section in the vertical and in the lateral plane, of the sign of
             the slope of the axis [rad].
         """
         line = self.rail_lines[0 if side == RIGHT else 1]
@@ -165,7 +165,7 @@ class GuidewayModel:
         )
 
     def girder_rows(self, x: npt.ArrayLike) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """Rows that give the motion of the girder's axis.
+        """Rows of the motion of the girder's axis.
 
         Parameters
         ----------
@@ -180,6 +180,31 @@ class GuidewayModel:
         u_z, _, u_y, _ = _line_rows(self.girder_line, x, self.n_dof)
         return u_z, u_y
 
+    def bearing_rows(self, span: int) -> sparse.csr_array:
+        """Rows that give how far a span has lifted off its bearings.
+
+        Parameters
+        ----------
+        span
+            Number of the span.
+
+        Returns
+        -------
+        opening : csr (4, dof)
+            Motion of the pier top down less that of the girder end [m]: right and left at the first
+            end, right and left at the last.
+        """
+        bearing, dof = self.parameters.bearing, self.span_dof[span]
+        rows = np.zeros((4, self.n_dof))
+        for end in range(2):
+            x = (span + end) * self.parameters.span_length
+            girder = dof[np.abs(self.place[dof] - [x, 0.0, 0.0]).max(axis=1) < 1e-6]
+            girder = girder[np.argsort(self.component[girder])]
+            for side, y in enumerate((bearing.y, -bearing.y)):
+                rows[2 * end + side, girder] = -_rigid_arm(y, bearing.z)[Z]
+                rows[2 * end + side, self.pier_top_dof[span + end]] = _rigid_arm(y, 0.0)[Z]
+        return sparse.csr_array(rows)
+
 
 @dataclass(frozen=True)
 class ModalDamping:
@@ -188,7 +213,7 @@ class ModalDamping:
     Attributes
     ----------
     rate
-        a, which every mode above the cut-off keeps [1/s].
+        a, the rate of every mode above the cut-off [1/s].
     mass : csr (dof, dof)
         M.
     frequency : (mode,)
@@ -249,12 +274,18 @@ def build(guideway: Guideway) -> GuidewayModel:
     Parameters
     ----------
     guideway
-        All that is given.
+        Parameters of the guideway.
 
     Returns
     -------
     model
         Degrees of freedom in the order pier, span, pier, …; each span's sorted along x.
+
+    Examples
+    --------
+    >>> model = build(Guideway(n_spans=1))
+    >>> model.pier_top_dof.shape  # two piers
+    (2, 6)
     """
     span, pier_mass, pier_stiffness, pier_depth = _span(guideway), *_pier(guideway)
     n_pier, n_span, n_spans = pier_mass.shape[0], span.mass.shape[0], guideway.n_spans
@@ -331,6 +362,12 @@ def modes(model: GuidewayModel, cutoff_hz: float) -> tuple[FloatArray, FloatArra
     References
     ----------
     Parlett, The Symmetric Eigenvalue Problem (1998), ch. 3 and 13.
+
+    Examples
+    --------
+    >>> frequency, shape = modes(build(Guideway(n_spans=1)), 20.0)
+    >>> bool(frequency.size > 0 and frequency[-1] <= 20.0)
+    True
     """
     if not cutoff_hz > 0:
         raise UserError(f"cutoff_hz must be positive, got {cutoff_hz} Hz")
@@ -388,6 +425,12 @@ def damping(model: GuidewayModel, ratio: float, cutoff_hz: float) -> ModalDampin
     References
     ----------
     Wilson and Penzien, Int. J. Numer. Methods Eng. 4 (1972) 5-10.
+
+    Examples
+    --------
+    >>> found = damping(build(Guideway(n_spans=1)), 0.02, 20.0)
+    >>> bool((found.coefficient <= 0.0).all())
+    True
     """
     if not 0 <= ratio < 1:
         raise UserError(f"damping ratio must lie in [0, 1), got {ratio}")
@@ -560,6 +603,11 @@ def rectangle_torsion_constant(width: float, depth: float) -> float:
     References
     ----------
     Timoshenko and Goodier, Theory of Elasticity (1970), sec. 109.
+
+    Examples
+    --------
+    >>> round(rectangle_torsion_constant(1.0, 1.0), 4)
+    0.1406
     """
     if not (width > 0 and depth > 0):
         raise UserError(f"sides must be positive, got {width} m and {depth} m")

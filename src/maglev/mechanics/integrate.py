@@ -14,24 +14,26 @@ from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import packing
 from maglev.mechanics import train as train_model
-from maglev.mechanics._kernels import passage
+from maglev.mechanics._kernels import cross
 from maglev.mechanics._records import (
     COMPLETED,
     NOT_FINITE,
     STEP_TOO_LARGE,
+    Footprints,
     MagnetRows,
     Outcome,
-    Places,
-    Run,
     Spans,
+    Timing,
     Vehicle,
 )
+from maglev.mechanics.comfort import WEIGHTINGS, readings
 from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.linear import Block
 from maglev.mechanics.reduction import ReducedGuideway, reduce
-from maglev.mechanics.responses import Passages, checked_gains
+from maglev.mechanics.responses import Passages, checked_gains, compared_with
+from maglev.mechanics.statics import largest_deflection
 from maglev.mechanics.step_limit import (
     guideway_limit,
     safe_gains,
@@ -45,19 +47,23 @@ from maglev.parameters import Config
 
 @dataclass(frozen=True)
 class System:
-    """Train, guideway, magnets and track as arrays for the kernels."""
+    """Train, guideway, magnets and track as arrays for the kernels.
+
+    ``static_deflection`` is the largest of midspan under the train at rest [m].
+    """
 
     train: train_model.TrainModel
     reduced: ReducedGuideway
     vehicle: Vehicle
     suspension: MagnetRows
     guidance: MagnetRows
-    suspension_places: Places
-    guidance_places: Places
+    suspension_footprints: Footprints
+    guidance_footprints: Footprints
     grounds: tuple[packing.Ground, packing.Ground]
     spans: Spans
     parts: tuple[Block, ...]
     safe_gains: FloatArray
+    static_deflection: float
     config: Config
 
 
@@ -73,7 +79,7 @@ def prepare(config: Config, profile: Profile) -> System:
     config
         Parameters of everything.
     profile
-        Track irregularity over `track_range`; nothing before the fade-in, where the train rests.
+        Track irregularity over `track_range`, zero before the fade-in, where the train rests.
 
     Returns
     -------
@@ -83,7 +89,7 @@ def prepare(config: Config, profile: Profile) -> System:
     Raises
     ------
     UserError
-        If the time step exceeds the stability limit or the profile is shorter than the run.
+        If the time step exceeds the stability limit or the profile does not cover the passage.
     """
     train = train_model.build(config.train)
     guideway = guideway_model.build(config.guideway)
@@ -96,8 +102,10 @@ def prepare(config: Config, profile: Profile) -> System:
     _check_step(config, reduced, parts)
     _check_reach(config, profile)
     suspension, guidance = (packing.magnet_rows(train, guidance=kind) for kind in (False, True))
-    suspension_places, suspension_ground = packing.places(config, suspension, guideway, reduced)
-    guidance_places, guidance_ground = packing.places(config, guidance, guideway, reduced)
+    suspension_footprints, suspension_ground = packing.footprints(
+        config, suspension, guideway, reduced
+    )
+    guidance_footprints, guidance_ground = packing.footprints(config, guidance, guideway, reduced)
     grounds = (suspension_ground, guidance_ground)
     tracks = packing.tracks(config, grounds, [profile])
     return System(
@@ -106,12 +114,13 @@ def prepare(config: Config, profile: Profile) -> System:
         vehicle=packing.vehicle(train),
         suspension=suspension,
         guidance=guidance,
-        suspension_places=suspension_places._replace(rail=tracks[0][0], ramp=tracks[0][1]),
-        guidance_places=guidance_places._replace(rail=tracks[1][0], ramp=tracks[1][1]),
+        suspension_footprints=suspension_footprints._replace(rail=tracks[0][0], ramp=tracks[0][1]),
+        guidance_footprints=guidance_footprints._replace(rail=tracks[1][0], ramp=tracks[1][1]),
         grounds=grounds,
         spans=packing.spans(reduced, config),
         parts=parts,
         safe_gains=safe_gains(parts, _mean_gains(config), course(config).time_step),
+        static_deflection=largest_deflection(guideway, train),
         config=config,
     )
 
@@ -122,14 +131,14 @@ def integrate(
     *,
     profile_of: Callable[[int], Profile] | None = None,
     record_every: int = 0,
+    with_magnets: bool = True,
     n_threads: int = 1,
     on_progress: Callable[[int], None] | None = None,
 ) -> Passages:
     """Run one passage per row of gains.
 
-    A sample whose gains make a motion grow by the step alone is not judged: its status says so.
-
-    A sample's numbers do not depend on its neighbours, on their number or on ``n_threads``.
+    A sample for whose gains the step is unstable is not judged: its status says so.  A sample's
+    numbers do not depend on its neighbours, on their number or on ``n_threads``.
 
     Parameters
     ----------
@@ -143,6 +152,8 @@ def integrate(
         not given.
     record_every
         Steps between recorded rows of the histories; zero records none.
+    with_magnets
+        Whether histories have the gaps and currents of the magnets, most of their size.
     n_threads
         Rows of samples that run at the same time.
     on_progress
@@ -165,41 +176,44 @@ def integrate(
     padded = np.empty((n_rows * LANES, 8))
     padded[:n_samples] = gains
     padded[n_samples:] = gains[-1]
-    run = packing.run(config, record_every)
+    timing = packing.timing(config, record_every)
     kinds = (system.suspension, system.guidance)
     suspension_law, guidance_law = (
-        packing.law(circuit, rows, run.time_step, gains)
+        packing.law(circuit, rows, timing.time_step, gains)
         for circuit, rows in zip(
             (config.control.suspension, config.control.guidance), kinds, strict=True
         )
     )
 
     def one_row(row: int) -> Outcome:
-        outcome = packing.empty_outcome(system.train, kinds, run)
+        outcome = packing.empty_outcome(system.train, kinds, timing, with_magnets=with_magnets)
         lanes = np.ascontiguousarray(padded[row * LANES : (row + 1) * LANES].T)
-        suspension_places, guidance_places = system.suspension_places, system.guidance_places
+        suspension_footprints, guidance_footprints = (
+            system.suspension_footprints,
+            system.guidance_footprints,
+        )
         if profile_of is not None:
             numbers = np.minimum(np.arange(row * LANES, (row + 1) * LANES), n_samples - 1)
             profiles = {int(k): profile_of(int(k)) for k in np.unique(numbers)}
             for profile in profiles.values():
                 _check_reach(config, profile)
             of_kinds = packing.tracks(config, system.grounds, [profiles[int(k)] for k in numbers])
-            suspension_places, guidance_places = (
-                places._replace(rail=rail, ramp=ramp)
-                for places, (rail, ramp) in zip(
-                    (suspension_places, guidance_places), of_kinds, strict=True
+            suspension_footprints, guidance_footprints = (
+                footprints._replace(rail=rail, ramp=ramp)
+                for footprints, (rail, ramp) in zip(
+                    (suspension_footprints, guidance_footprints), of_kinds, strict=True
                 )
             )
-        passage(
+        cross(
             system.vehicle,
             system.suspension,
             system.guidance,
             suspension_law,
             guidance_law,
-            suspension_places,
-            guidance_places,
+            suspension_footprints,
+            guidance_footprints,
             system.spans,
-            run,
+            timing,
             lanes,
             outcome,
         )
@@ -209,12 +223,12 @@ def integrate(
 
     with ThreadPoolExecutor(max_workers=n_threads) as pool:
         outcomes = list(pool.map(one_row, range(n_rows)))
-    too_fast = samples_too_fast(system.parts, gains, run.time_step, system.safe_gains)
-    return _gathered(outcomes, n_samples, system, run, too_fast)
+    too_fast = samples_too_fast(system.parts, gains, timing.time_step, system.safe_gains)
+    return _gathered(outcomes, n_samples, system, timing, too_fast)
 
 
 def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ...]) -> None:
-    """Refuse a step at which the guideway, or the train at its mean gains, would grow by itself."""
+    """Refuse a step that is unstable for the guideway or for the train at its mean gains."""
     dt, gains = course(config).time_step, _mean_gains(config)
     limit = guideway_limit(config, reduced, dt)
     if not step_holds(parts, gains, dt):
@@ -231,7 +245,7 @@ def _mean_gains(config: Config) -> FloatArray:
 
 
 def _check_reach(config: Config, profile: Profile) -> None:
-    """Refuse a profile that is shorter than the run."""
+    """Refuse a profile that does not cover the passage."""
     start, stop = track_range(config)
     grid_stop = profile.x0 + profile.dx * (profile.values.shape[1] - 1)
     if profile.x0 > start or grid_stop < stop:
@@ -245,7 +259,7 @@ def _gathered(
     outcomes: list[Outcome],
     n_samples: int,
     system: System,
-    run: Run,
+    timing: Timing,
     too_fast: BoolArray,
 ) -> Passages:
     n_cars = system.vehicle.body_z.size
@@ -264,22 +278,39 @@ def _gathered(
     # A lost sample goes on in its row as long as others hold; what it does then means nothing.
     lost_time, is_lost = samples_first("lost_time"), samples_first("lost_magnet") >= 0
     number = np.arange(1.0, outcomes[0].history.shape[0] + 1)
-    time = number * (run.record_every * run.time_step)
+    time = number * (timing.record_every * timing.time_step)
     history = np.moveaxis(samples_first("history"), 1, 2).copy()
     for sample in np.flatnonzero(is_lost):
-        history[sample, :, time >= lost_time[sample] - 0.5 * run.time_step] = np.nan
+        history[sample, :, time >= lost_time[sample] - 0.5 * timing.time_step] = np.nan
     kept = ("gap_min", "gap_max", "current_max")  # in the order of `Outcome.at_loss`
     bounds = np.concatenate([samples_first(name) for name in kept], axis=1)
     bounds = np.where(is_lost[:, None], samples_first("at_loss"), bounds)
     bounds[too_fast], history[too_fast] = np.nan, np.nan
     at = 4 + 2 * n_cars
+    ends = extreme[:, at : at + 2 * n_cars]
+    ends_time = when[:, at : at + 2 * n_cars]
+    signed = samples_first("signed")
+    squares = samples_first("squares").reshape(n_samples, len(WEIGHTINGS), n_cars, 2)
+    weighted = np.sqrt(squares.max(axis=3) / readings(system.config).count)
+    for of_sample in (signed, weighted):
+        of_sample[status != COMPLETED] = np.nan
     return Passages(
         girder=extreme[:, :4],
         girder_time=when[:, :4],
         body_z=extreme[:, 4 : 4 + n_cars],
-        body_y=extreme[:, 4 + n_cars :],
+        body_y=extreme[:, 4 + n_cars : at],
         body_z_time=when[:, 4 : 4 + n_cars],
-        body_y_time=when[:, 4 + n_cars :],
+        body_y_time=when[:, 4 + n_cars : at],
+        girder_positive=signed[:, 0::2],
+        girder_negative=signed[:, 1::2],
+        end_z=ends[:, :n_cars],
+        end_y=ends[:, n_cars:],
+        end_z_time=ends_time[:, :n_cars],
+        end_y_time=ends_time[:, n_cars:],
+        weighted=weighted,
+        lift=extreme[:, -1],
+        lift_time=when[:, -1],
+        **compared_with(system.config, system.static_deflection, n_samples),
         gap_min=bounds[:, 0:2],
         gap_max=bounds[:, 2:4],
         current_max=bounds[:, 4:6],

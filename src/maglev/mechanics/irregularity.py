@@ -35,7 +35,7 @@ class Measured:
     source
         Where it comes from, for messages.
     x : (station,)
-        Place along the guideway [m], strictly rising, zero at the first pier.
+        Position along the guideway [m], strictly rising, zero at the first pier.
     displacement : (4, station)
         In the order of `PROFILE_NAMES` [m].
     """
@@ -52,7 +52,7 @@ class Profile:
     Attributes
     ----------
     x0
-        Place of the first grid point [m].
+        Position of the first grid point [m].
     dx
         Grid spacing [m].
     values : (profile, grid)
@@ -75,19 +75,20 @@ def profile(
 ) -> Profile:
     """Irregularity of both rails in both directions over a stretch of track.
 
-    Nothing before ``x = -fade_in``, in full from ``x = 0``, in between times a ramp with continuous
-    curvature.  The same seed gives the same profile, bit for bit, whatever the stretch.
+    It is zero before ``x = -fade_in`` and complete from ``x = 0``; in between it is multiplied by a
+    ramp with continuous curvature.  The same seed gives the same profile, bit for bit, whatever
+    the stretch.
 
     Parameters
     ----------
     irregularity
         Spectra, wavelengths, fade-in; whether both sides share one profile.
     length_range
-        First and last place needed [m]; the grid covers both.
+        First and last position needed [m]; the grid covers both.
     seed
         Seed of the phases; each row of the profile has its own child seed.
     measured
-        Measured profile to take instead of the spectra; its file says what the sides share.
+        Measured profile that replaces the spectra; its file says whether both sides share one.
 
     Returns
     -------
@@ -148,7 +149,7 @@ def displacement(profile: Profile, x: npt.ArrayLike) -> tuple[FloatArray, FloatA
     profile
         The profile.
     x : (...)
-        Places [m].
+        Positions [m].
 
     Returns
     -------
@@ -160,7 +161,7 @@ def displacement(profile: Profile, x: npt.ArrayLike) -> tuple[FloatArray, FloatA
     Raises
     ------
     UserError
-        If a place lies outside the grid.
+        If a position lies outside the grid.
 
     Examples
     --------
@@ -172,7 +173,7 @@ def displacement(profile: Profile, x: npt.ArrayLike) -> tuple[FloatArray, FloatA
     n = profile.values.shape[1]
     if not np.all((position >= 0) & (position <= n - 1)):
         raise UserError(
-            f"places must lie in the profile's range {profile.x0:g} to "
+            f"x must lie in the profile's range {profile.x0:g} to "
             f"{profile.x0 + (n - 1) * profile.dx:g} m, got {np.min(x):g} to {np.max(x):g} m"
         )
     cell = np.minimum(position.astype(int), n - 2)
@@ -296,8 +297,8 @@ def spectral_density(spectrum: Spectrum, wavenumber: npt.ArrayLike) -> FloatArra
 def wavenumbers(irregularity: Irregularity) -> tuple[FloatArray, float]:
     """Midpoints of equal cells between the longest and the shortest wavelength.
 
-    Equal cells, as the sum then has no gaps seen by a stretch shorter than ``1 / spacing`` (1 km
-    for 1000 harmonics from 1 to 100 m); cells that widen with n would leave gaps at short waves.
+    With equal cells the sum shows no gaps on a stretch shorter than ``1 / spacing`` (1 km for 1000
+    harmonics from 1 to 100 m); cells that widen with n would leave gaps at short waves.
 
     Parameters
     ----------
@@ -389,7 +390,7 @@ def _splined(
     """Cubic spline through a measured profile; beyond its ends it keeps its last value."""
     if measured.x[0] > start or measured.x[-1] < end:
         raise UserError(
-            f"{measured.source} must cover the run from {start:g} to {end:g} m, "
+            f"{measured.source} must cover the passage from {start:g} to {end:g} m, "
             f"got {measured.x[0]:g} to {measured.x[-1]:g} m"
         )
     spline = CubicSpline(measured.x, measured.displacement, axis=1)

@@ -3,8 +3,8 @@
 Samples lie innermost in every array of the production solver, ``(…, LANES)`` in C order.  `load`
 takes one row into registers, arithmetic acts on all samples at once, `store` puts it back.  No
 operation mixes lanes, so a sample's numbers cannot depend on its neighbours, bit for bit.
-`entry` reads one number that all samples share, ``array.ravel()[place]``; Numba's own indexing
-would first ask of every place whether it counts from the end.
+`entry` reads one number that all samples share, ``array.ravel()[index]``; Numba's own indexing
+would first ask of every index whether it counts from the end.
 
 With ``NUMBA_DISABLE_JIT=1`` the same names act on NumPy rows, so that kernels run as plain Python.
 """
@@ -28,7 +28,7 @@ LANES = 16
 """Samples side by side [-]: two AVX-512 or four AVX2 registers of doubles."""
 
 WIDE = bool(binding.get_host_cpu_features().get("avx512f", False))
-"""Whether the processor has 32 registers for rows, not 16: kernels then take more rows at once."""
+"""Whether the processor has 32 vector registers, not 16: kernels then take more rows at once."""
 
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 
@@ -120,15 +120,15 @@ def _store(typing_context: Any, array: Any, row: Any, value: Any) -> Any:
 
 
 @intrinsic
-def _entry(typing_context: Any, array: Any, place: Any) -> Any:
+def _entry(typing_context: Any, array: Any, index: Any) -> Any:
     def codegen(context: Any, builder: Any, sig: Signature, args: Any) -> Any:
         view = context.make_array(sig.args[0])(context, builder, args[0])
-        place = context.cast(builder, args[1], sig.args[1], types.intp)
-        return builder.load(builder.gep(view.data, [place]))
+        index = context.cast(builder, args[1], sig.args[1], types.intp)
+        return builder.load(builder.gep(view.data, [index]))
 
     if array.layout != "C":
         raise TypingError(f"entry needs an array in C order, got {array}")
-    return array.dtype(array, place), codegen
+    return array.dtype(array, index), codegen
 
 
 @intrinsic
@@ -180,8 +180,8 @@ def _store_python(array: np.ndarray, row: int, value: Any) -> None:
     array.reshape(-1, LANES)[row] = value
 
 
-def _entry_python(array: np.ndarray, place: int) -> Any:
-    return array.reshape(-1)[place]
+def _entry_python(array: np.ndarray, index: int) -> Any:
+    return array.reshape(-1)[index]
 
 
 def _fma_python(a: Any, b: Any, c: Any) -> Any:

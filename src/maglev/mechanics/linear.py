@@ -4,8 +4,8 @@ Its motion q obeys (M s² + C s + K + Σ h(s) G) q = 0, one term for each kind o
 
     h(s) = (k_p + k_d s + k_a s² + k_i / s) exp(-T s) / (1 + τ s).
 
-A train is the same seen from its other side and from its other end, so that this falls apart into
-small blocks.  Theory: docs/theory/control.md.
+A train is symmetric from side to side and from end to end, so the equation falls apart into small
+blocks.  Theory: docs/theory/control.md.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from maglev.mechanics.train import TrainModel, pole_offsets, pole_static_force
 from maglev.parameters import Circuit, Control
 
 GAINS_OF_KIND = ((0, 1, 4, 5), (2, 3, 6, 7))
-"""Places of k_p, k_d, k_a, k_i among the eight gains: of suspension, of guidance."""
+"""Columns of k_p, k_d, k_a, k_i among the eight gains: of suspension, of guidance."""
 
 _IN_A_CAR = {
     "body": (1, 1),
@@ -53,10 +53,10 @@ class Loop:
     Attributes
     ----------
     fed_by : (freedom,)
-        Coordinates of the block whose motion makes the signal.
+        Coordinates of the block that feed the signal.
     pull : (coordinate, freedom)
-        Closing force [N, N m] per unit of current gain and of each of them: what the matrix G is
-        in these columns.
+        Closing force [N, N m] per unit of current gain and of each of them: these columns of the
+        matrix G.
     lag, delay
         Time constant τ of the current and delay T of the signal [s].
     """
@@ -69,7 +69,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Block:
-    """Coupled coordinates of the train, independent of all others.
+    """Coordinates of the train that are coupled with each other and with no others.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Block:
     mass : (coordinate,)
         Diagonal of the mass matrix M [kg, kg m²].
     damping, stiffness : (coordinate, coordinate)
-        C and K: of the links, and in K of the attraction that grows where the gap closes.
+        C and K: of the links; K includes the negative stiffness of the magnets.
     loops
         Of suspension and of guidance.
     """
@@ -100,7 +100,7 @@ def closing_matrices(
     train
         Train with open magnets.
     control
-        Who shares a circuit.
+        Sharing of circuits.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def closing_matrices(
         Stiffness of the magnets at constant current, -2F₀/δ₀ of each pole.
     suspension, guidance : (dof, dof)
         Closing force per unit of current gain and of each degree of freedom: 2F₀/i₀ of each pole
-        times the gap its circuit is fed by.
+        times the gap that feeds its circuit.
 
     References
     ----------
@@ -163,7 +163,7 @@ def closed_train(
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d, then k_a [A s²/m] and k_i [A/(m s)] of
         each; k_i does not enter.
     control
-        Who shares a circuit; every pole its own if not given.
+        Sharing of circuits; one circuit for each pole if not given.
 
     Returns
     -------
@@ -350,7 +350,7 @@ def characteristic(
     gains : (8,)
         As in `closed_train`.
     s
-        Where [1/s]; not zero where k_i is not.
+        Complex frequency [1/s]; not zero where k_i is not.
 
     Returns
     -------
@@ -461,8 +461,8 @@ def growth_rate(parts: tuple[Block, ...], gains: FloatArray) -> float:
 def modes(parts: tuple[Block, ...], gains: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """Oscillatory modes of the levitated train, from the slowest.
 
-    With delay there are more of them without end, fast and of the circuits; one for each pair of
-    roots that the train has without delay is kept, the slowest.
+    With delay there are infinitely many, the fast ones of the circuits; as many of the slowest are
+    kept as the train has without delay.
 
     Parameters
     ----------
@@ -474,7 +474,7 @@ def modes(parts: tuple[Block, ...], gains: FloatArray) -> tuple[ComplexArray, Co
     Returns
     -------
     root : (mode,)
-        With positive imaginary part [1/s]: the frequency is its size.
+        Roots with positive imaginary part [1/s]; the circular frequency is their size.
     shape : (mode, dof)
         Motion of the train's degrees of freedom, complex, without scale.
 
@@ -520,17 +520,17 @@ def border(
     gains : (8,)
         Where the search starts; the train must be stable there.
     gain
-        Which of the eight moves, the others stay.
+        Which of the eight is varied; the others stay.
     limit
-        Where it moves to, in equal steps, until the train is not stable; the root of the growth
-        rate in that step is the border.
+        Its last value; it is reached in equal steps.  In the first step that makes the train
+        unstable, the root of the growth rate is the border.
     n_steps
-        Number of steps; a return to stability within one is not seen.
+        Number of steps; a return to stability within one step goes unnoticed.
 
     Returns
     -------
     border
-        NaN if the train is stable all the way.
+        Value of the gain; NaN if the train is stable up to the limit.
 
     Raises
     ------
@@ -576,7 +576,7 @@ def _rightmost(roots: ComplexArray) -> complex:
 
 
 def _polished(block: Block, gains: FloatArray, root: complex, shape: ComplexArray) -> complex:
-    """Newton's method on the characteristic equation, from an eigenvalue and its motion."""
+    """Root of the characteristic equation by Newton's method, from an eigenvalue and its shape."""
     kept = shape.conj() / (np.abs(shape) ** 2).sum()
     for _ in range(_MOST_STEPS):
         matrix, slope = characteristic(block, gains, root)

@@ -1,4 +1,4 @@
-"""Arrays for the kernels: train, magnets, circuits, places and guideway."""
+"""Arrays for the kernels: train, magnets, circuits, footprints and guideway."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics._records import (
+    Comfort,
+    Footprints,
     Law,
     MagnetRows,
     Outcome,
-    Places,
-    Run,
     Spans,
     Stretches,
+    Timing,
     Vehicle,
 )
 from maglev.mechanics.activity import Stretch, stepped_mass, stretches, top_stiffness
+from maglev.mechanics.comfort import WEIGHTINGS, readings
 from maglev.mechanics.control import grouping, late_current
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile, mean_displacement
@@ -34,15 +36,15 @@ from maglev.parameters import Circuit, Config, Guideway, Magnet
 
 @dataclass(frozen=True)
 class Ground:
-    """Where poles of one kind can be after whole numbers of steps, and the sag of the rails there.
+    """Positions of the faces of one kind of pole after whole numbers of steps, and the sag there.
 
     Attributes
     ----------
-    x : (place,)
+    x : (footprint,)
         Middle of a pole's face [m].
     pole_length
         Of the face [m].
-    sag, sag_slope : (place, side)
+    sag, sag_slope : (footprint, side)
         Standing sag in the direction of the irregularity [m], and its derivative along travel [-].
     """
 
@@ -72,6 +74,9 @@ def vehicle(train: train_model.TrainModel) -> Vehicle:
         pull_coefficient=columns.data.astype(np.float64),
         body_z=np.ascontiguousarray(train.car_body_dof[:, 1], dtype=np.int64),
         body_y=np.ascontiguousarray(train.car_body_dof[:, 0], dtype=np.int64),
+        body_pitch=np.ascontiguousarray(train.car_body_dof[:, 3], dtype=np.int64),
+        body_yaw=np.ascontiguousarray(train.car_body_dof[:, 4], dtype=np.int64),
+        end_distance=train.parameters.end_distance,
     )
 
 
@@ -119,19 +124,19 @@ def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: FloatArray)
     Parameters
     ----------
     circuit
-        Who shares a circuit, and how late its current comes.
+        Sharing of circuits, and lag and delay of their current.
     rows
         The magnets.
     time_step
         Δt [s].
     gains : (sample, 8)
-        Of all samples: they say whether acceleration and integral part are needed at all.
+        Gains of all samples; terms whose gains are all zero are skipped.
 
     Returns
     -------
     law
-        A command that is linear within a step is followed exactly by the lag; the delayed signal is
-        that of a parabola through three steps.
+        The lag is exact for a command that is linear within a step; the delayed signal is
+        interpolated by a parabola through three steps.
 
     References
     ----------
@@ -173,17 +178,19 @@ def _stride(guideway: Guideway) -> int:
     return rail.units_per_span * 2 * (rail.connectors_per_unit + 2)
 
 
-def places(
+def footprints(
     config: Config,
     rows: MagnetRows,
     guideway: guideway_model.GuidewayModel,
     reduced: ReducedGuideway,
-) -> tuple[Places, Ground]:
+) -> tuple[Footprints, Ground]:
     """Tabulate rails and sag under the poles after whole numbers of steps; no track yet."""
     way = course(config)
     begins = (rows.x[:, None] + rows.offset + way.start) / way.advance
     whole = np.floor(begins + 1e-6)
-    beyond = np.round(begins - whole, 6)  # share of a step; places with the same one form a series
+    beyond = np.round(
+        begins - whole, 6
+    )  # share of a step; footprints with the same share form a series
     series = np.unique(beyond)
     earliest = int(whole.min())
     count = int(whole.max()) - earliest + way.n_steps + 1
@@ -195,15 +202,15 @@ def places(
     )
     sag, sag_slope = _standing_sag(config, rows, guideway, reduced, x, way.advance)
     apart = np.array([1.0, -1.0 if rows.is_guidance else 1.0])
-    nothing = np.zeros((x.size, 2, 1))
-    tabulated = Places(
+    flat = np.zeros((x.size, 2, 1))
+    tabulated = Footprints(
         number=number,
         first=faces.first,
         start=faces.start,
         weight=faces.weight,
         rise=faces.slope * config.passage.speed,
-        rail=nothing,
-        ramp=nothing,
+        rail=flat,
+        ramp=flat,
     )
     ground = Ground(
         x=x,
@@ -221,7 +228,7 @@ def _magnet(config: Config, rows: MagnetRows) -> Magnet:
 def tracks(
     config: Config, grounds: tuple[Ground, Ground], profiles: Sequence[Profile]
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Irregularity at the places of each kind of pole, and its rate (place, side, profile)."""
+    """Irregularity under each kind of pole, and its rate (footprint, side, profile)."""
     met = []
     one_each = list({id(profile): profile for profile in profiles}.values())
     column = [next(k for k, one in enumerate(one_each) if one is profile) for profile in profiles]
@@ -244,7 +251,7 @@ def _standing_sag(
     x: FloatArray,
     advance: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Sag of the rails under poles at ``x`` beyond that of the modes, and its slope along x.
+    """Sag of the rails at poles at ``x`` that the modes leave out, and its slope along x.
 
     The slope under a face is its mean over a step, as that of `face_weights`.
     """
@@ -254,7 +261,7 @@ def _standing_sag(
     sag, slope = np.zeros_like(x), np.zeros_like(x)
     for span in range(n_spans):
         inside = np.flatnonzero((x >= span * length) & (x < (span + 1) * length))
-        places, of_span, its_slope = standing_sag(
+        along, of_span, its_slope = standing_sag(
             guideway,
             reduced,
             span,
@@ -264,12 +271,12 @@ def _standing_sag(
             pole_length=magnet.pole_length,
         )
         at = x[inside] - span * length
-        sag[inside] = np.interp(at, places, of_span)
+        sag[inside] = np.interp(at, along, of_span)
         if magnet.pole_length == 0:
-            slope[inside] = np.interp(at, places, its_slope)
+            slope[inside] = np.interp(at, along, its_slope)
             continue
         ends = [np.clip(at + part * advance, 0.0, length) for part in (-0.5, 0.5)]
-        rise = np.subtract(*(np.interp(end, places, of_span) for end in ends[::-1]))
+        rise = np.subtract(*(np.interp(end, along, of_span) for end in ends[::-1]))
         slope[inside] = rise / (ends[1] - ends[0])
     return sag, slope
 
@@ -341,6 +348,8 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
         midspan=midspan,
         middle=middle,
         rest=np.stack([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
+        bearing=np.stack([_relative(reduced, middle, shape) for shape in reduced.bearing]),
+        bearing_rest=reduced.bearing_rest,
         damping_column=damping_column,
         damping=damping,
         taken_mode=taken_mode,
@@ -350,7 +359,7 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
 
 
 def _relative(reduced: ReducedGuideway, span: int, shape: FloatArray) -> FloatArray:
-    """Motion (column, …) in a span when its modes count from where the pier tops take them."""
+    """Shapes (column, …) of a span whose modes are relative to the pier tops."""
     columns, own = reduced.span_coordinates[span], reduced.own_modes(span)
     tops = columns[own.size :] - reduced.n_modes
     carried = reduced.carried[own][:, tops]
@@ -358,10 +367,10 @@ def _relative(reduced: ReducedGuideway, span: int, shape: FloatArray) -> FloatAr
 
 
 def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array:
-    """Damping on the rates of the coordinates as stepped.
+    """Damping matrix for the rates of a step.
 
-    A mode's rate in a step, a central difference, is sinc(ωΔt) of its true one; its own damping
-    makes up for that.
+    The rate of a mode in a step, a central difference, is sinc(ωΔt) times the true one; its own
+    damping is divided by this factor.
     """
     damping = reduced.relative_damping.copy()
     phase = np.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes]) * time_step
@@ -372,9 +381,9 @@ def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array
 
 
 def _whole_and_short(matrix: sp.csr_array, always: BoolArray) -> sp.csr_array:
-    """The rows of a matrix, then the same without columns that are not stepped in all stretches.
+    """The rows of a matrix, then the same rows without columns that some stretch does not step.
 
-    Short rows are those of quiet spans.
+    The short rows are those of quiet spans.
     """
     both = sp.vstack([matrix, matrix @ sp.diags_array(always.astype(float))]).tocsr()
     both.eliminate_zeros()
@@ -388,9 +397,9 @@ def _stretches(
     damping_start: IntArray,
     taken_start: IntArray,
 ) -> Stretches:
-    """Active coordinates of each stretch.
+    """Active coordinates of each stretch, and the ends of their rows in the matrices.
 
-    With the ends of their rows, whole or short, of damping and of modes carried by pier tops.
+    Rows, whole or short, of the damping and of the modes carried by pier tops.
     """
     n = reduced.n_modes
     dt = course(config).time_step
@@ -442,10 +451,10 @@ def _rows(matrix: sp.csr_array) -> tuple[IntArray, IntArray, FloatArray]:
     return rows.indptr.astype(np.int64), rows.indices.astype(np.int64), rows.data
 
 
-def run(config: Config, record_every: int) -> Run:
+def timing(config: Config, record_every: int) -> Timing:
     passage = config.passage
     way = course(config)
-    return Run(
+    return Timing(
         first_step=way.first_step,
         n_steps=way.n_steps,
         time_step=way.time_step,
@@ -456,26 +465,50 @@ def run(config: Config, record_every: int) -> Run:
         gap_lost=passage.gap_lost,
         sections=np.ascontiguousarray(acceleration_filter(passage, way.time_step)),
         record_every=record_every,
+        comfort=_comfort(config),
+    )
+
+
+def _comfort(config: Config) -> Comfort:
+    """Weightings of the cars' accelerations for the kernels."""
+    read = readings(config)
+    filters = [one.sections(read.every * course(config).time_step) for one in WEIGHTINGS]
+    return Comfort(
+        every=read.every,
+        start=np.cumsum([0, *(len(one) for one in filters)]),
+        sections=np.concatenate(filters),
+        first=read.first,
+        last=read.last,
     )
 
 
 def empty_outcome(
-    train: train_model.TrainModel, kinds: tuple[MagnetRows, MagnetRows], run: Run
+    train: train_model.TrainModel,
+    kinds: tuple[MagnetRows, MagnetRows],
+    timing: Timing,
+    *,
+    with_magnets: bool = True,
 ) -> Outcome:
-    """Empty results of a row of samples, as for a train at rest."""
+    """Results of a row of samples before the first step: those of a train at rest.
+
+    Without the magnets, histories have no room for their gaps and currents.
+    """
     n_cars = train.parameters.n_cars
     table = train.magnets
     n_magnets = table.x.size
-    n_records = run.n_steps // run.record_every if run.record_every else 0
+    n_records = timing.n_steps // timing.record_every if timing.record_every else 0
     gap = np.array([[k.gap_reference] * LANES for k in kinds])
     current = np.array([[k.current_reference] * LANES for k in kinds])
-    history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets, LANES))
-    of_kind = table.is_guidance.astype(np.int64)
-    history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]
-    history[:, -n_magnets:] = current[of_kind]
+    history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets * with_magnets, LANES))
+    if with_magnets:
+        of_kind = table.is_guidance.astype(np.int64)
+        history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]
+        history[:, -n_magnets:] = current[of_kind]
     return Outcome(
-        extreme=np.zeros((4 + 2 * n_cars, LANES)),
-        extreme_time=np.zeros((4 + 2 * n_cars, LANES)),
+        extreme=np.zeros((5 + 4 * n_cars, LANES)),
+        extreme_time=np.zeros((5 + 4 * n_cars, LANES)),
+        signed=np.zeros((8, LANES)),
+        squares=np.zeros((2 * n_cars * len(WEIGHTINGS), LANES)),
         gap_min=gap.copy(),
         gap_max=gap.copy(),
         current_max=current,

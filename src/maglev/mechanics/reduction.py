@@ -2,8 +2,8 @@
 
 Craig-Bampton with the interface shapes made mass-orthogonal to the component modes, so that the
 mass matrix is the identity on the modes and banded on the pier tops.  Every coordinate belongs to
-one span or one pier: no mode runs through the whole line, and cost grows with its length only where
-the train is.
+one span or one pier: no mode runs through the whole guideway, and cost grows with its length only
+where the train is.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from maglev.mechanics import timoshenko
 from maglev.parameters import Guideway
 
 _SAG_POINTS = 32
-"""Places within a pole pitch at which the standing sag is tabulated [-]; assumed."""
+"""Points per pole pitch at which the standing sag is tabulated [-]; assumed."""
 
 DAMPING_DROP = 3e-3
 """Entries of the damping matrix below this share of their diagonals are dropped [-]; assumed,
@@ -45,8 +45,8 @@ class ReducedGuideway:
     stiffness : (coordinate, coordinate)
         Sparse.
     carried : (mode, top)
-        Share of a pier top's motion that a component mode takes along; sparse.  Without it a mode's
-        coordinate is its motion relative to the pier tops.
+        Motion of a component mode per motion of a pier top that carries it; sparse.  Less this
+        share, a mode's coordinate is its motion relative to the pier tops.
     relative_damping : (coordinate, coordinate)
         Acts on the relative rates of the modes and the rates of the pier tops; sparse.
     rail_z, rail_roll, rail_y : span of (column, coefficient)
@@ -56,8 +56,15 @@ class ReducedGuideway:
     midspan_z, midspan_y : (column,)
         Motion of the middle span's girder axis at midspan per unit coordinate.
     rest_z, rest_roll, rest_y : (coefficient,)
-        Motion of midspan, z under forces on ``rail_z`` and y under those on ``rail_roll`` and
-        ``rail_y`` of the middle span, that its modes leave out [m/N].
+        Flexibility of midspan in the left-out modes of the middle span: z under forces on
+        ``rail_z``, y under forces on ``rail_roll`` and ``rail_y`` [m/N].
+    bearing : (4, column)
+        Opening of the middle span's bearings per unit coordinate: at the first end the mean of
+        right and left and half their difference, then at the last.
+    bearing_rest : (6, coefficient)
+        That opening, which its modes leave out, under forces on the rails of the middle span [m/N]:
+        at either end the mean under those on ``rail_z``, half the difference under those on
+        ``rail_roll`` and on ``rail_y``.
     basis : (dof, coordinate)
         Motion of the finite-element model per unit coordinate.
     """
@@ -77,6 +84,8 @@ class ReducedGuideway:
     rest_z: FloatArray
     rest_roll: FloatArray
     rest_y: FloatArray
+    bearing: FloatArray
+    bearing_rest: FloatArray
     basis: sp.csr_array
 
     @property
@@ -112,9 +121,9 @@ class ReducedGuideway:
 def rail_nodes(n_connectors: int) -> FloatArray:
     """Ends and connectors of a unit of rail, from its start in connector spacings (node,) [-].
 
-    Between them the rail is a beam element, whose shapes the motion of its nodes goes through, and
-    none bridges the joint of two units.  Units join with a kink, and poles that pass
-    kinks one after the other shake the guideway at the rate of pole passing.
+    Between them the rail is a beam element; no element bridges the joint of two units.  Units join
+    with a kink, and poles that pass the kinks one after the other shake the guideway at the rate
+    of pole passing.
     """
     return np.concatenate([[0.0], np.arange(n_connectors) + 0.5, [float(n_connectors)]])
 
@@ -122,21 +131,21 @@ def rail_nodes(n_connectors: int) -> FloatArray:
 def rail_weights(
     guideway: Guideway, x: npt.ArrayLike, *, lateral: bool
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Weights of the rail coefficients of a span in the motion of places along it.
+    """Weights of the rail coefficients of a span in the motion of points along it.
 
     Parameters
     ----------
     guideway
         Parameters.
     x : (point,)
-        Places along the span, from its start [m].
+        Points along the span, from its start [m].
     lateral
         Whether the motion is ``rail_y``; else ``rail_z`` or ``rail_roll``.
 
     Returns
     -------
     first : (point,)
-        The first of the four neighbouring coefficients that count at a place [-].
+        First of the four adjacent coefficients that move a point [-].
     weight, slope : (point, 4)
         Of the coefficients in the motion [-] and in its derivative along travel [1/m].
     """
@@ -165,10 +174,10 @@ class FaceWeights:
 
     Attributes
     ----------
-    first : (place,)
-        First of the neighbouring coefficients, those of span after span, that count.
-    start : (place + 1,)
-        Where the weights of each place begin; places with no rail under the face have none.
+    first : (face,)
+        First of the adjacent coefficients under a face, counted span after span.
+    start : (face + 1,)
+        Where the weights of each face begin; a face with no rail under it has none.
     weight : (coefficient,)
         Of the coefficients in the mean motion [-].
     slope : (coefficient,)
@@ -184,7 +193,7 @@ class FaceWeights:
 def face_weights(
     guideway: Guideway, x: npt.ArrayLike, length: float, *, lateral: bool, advance: float = 0.0
 ) -> FaceWeights:
-    """Mean motion of the rails under faces, the rails straight and rigid off the guideway.
+    """Weights of the mean motion of the rails under faces; off the guideway they do not move.
 
     A face that passes a joint sees the step between two units as a ramp: the derivative of its mean
     is the difference of the motions under its two edges over its length.  It jumps where an edge
@@ -194,15 +203,15 @@ def face_weights(
     ----------
     guideway
         Parameters.
-    x : (place,)
+    x : (face,)
         Middles of the faces, from the first pier [m].
     length
         Of a face [m]; zero for points.
     lateral
         Whether the motion is ``rail_y``; else ``rail_z`` or ``rail_roll``.
     advance
-        Way from half before a place to half behind it over which its slope is averaged [m]; zero
-        for the slope at the place.  Points have none but that.
+        Distance over which the slope is averaged, half of it on either side [m]; zero for the slope
+        at ``x`` itself, the only one that points (``length`` zero) have.
 
     Returns
     -------
@@ -244,7 +253,7 @@ def face_weights(
 
 
 def _met(joints: FloatArray, low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
-    """First and last piece of rail under stretches; off the guideway, the nearest piece."""
+    """First and last piece of rail under intervals; off the guideway, the nearest piece."""
     last = joints.size - 2
     rear = np.clip(np.searchsorted(joints, low + 1e-9, side="right") - 1, 0, last)
     front = np.clip(np.searchsorted(joints, high - 1e-9, side="left") - 1, 0, last)
@@ -261,7 +270,7 @@ def _add_means(
     *,
     lateral: bool,
 ) -> None:
-    """Add ``factor`` times the mean motion of the rails over stretches to their coefficients."""
+    """Add ``factor`` times the mean motion of the rails over intervals to their coefficients."""
     joints = _pieces(guideway)
     rear, front = _met(joints, low, high)
     on = (high > 1e-9) & (low < joints[-1] - 1e-9)
@@ -298,7 +307,7 @@ def _coefficient_of(guideway: Guideway, piece: IntArray) -> IntArray:
 def _piece_weights(
     guideway: Guideway, piece: IntArray, x: FloatArray, *, lateral: bool
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """As `rail_weights`, along the whole guideway and for places on known pieces of rail."""
+    """As `rail_weights`, along the whole guideway and for points on known pieces of rail."""
     rail = guideway.rail
     joints = _pieces(guideway)
     spacing = guideway.span_length / (rail.units_per_span * rail.connectors_per_unit)
@@ -327,7 +336,7 @@ def standing_sag(
     """Static sag of the rails under a row of poles, less the part that the kept modes represent.
 
     The bays between connectors follow the poles at once: their modes lie far above the cut-off.
-    The pole forces hardly vary, so that what the left-out modes add is taken once for all.
+    As the pole forces hardly vary, the sag of the left-out modes is computed once, for rest.
 
     Parameters
     ----------
@@ -347,9 +356,9 @@ def standing_sag(
     Returns
     -------
     x, sag, slope : (point,)
-        Places along the span, from its start [m], the motion of the rail at a pole there in the
-        direction of the force, with other poles all along the span [m], and its derivative along
-        travel [-].  Both jump where units meet, at two neighbouring places.
+        Points along the span, from its start [m]; sag of the rail at a pole there, in the
+        direction of the force, with other poles all along the span [m]; its derivative along travel
+        [-].  Both jump at joints of units, where two points coincide.
     """
     length, dof = model.parameters.span_length, model.span_dof[span]
     n_units, n_poles = model.parameters.rail.units_per_span, round(length / pitch)
@@ -386,7 +395,7 @@ def standing_sag(
 def _moving_mean(n_points: int, width: float) -> sp.csr_array:
     """Mean (point, point) over ``width`` neighbouring points, the first next to the last.
 
-    Faces that reach over a pier lie on the next span, which is like this one.
+    Faces that reach over a pier continue on the next span, which is taken to be the same.
     """
     reach = int(np.ceil(0.5 * width + 0.5))
     offset = np.arange(-reach, reach + 1)
@@ -411,7 +420,7 @@ def reduce(
         Highest mode of the middle span that is kept, and the frequency up to which damping is a
         share of critical [Hz].
     cutoff_elsewhere
-        Highest mode of the piers and the other spans, whose own motion nobody asks for [Hz];
+        Highest mode of the piers and the other spans, whose responses are not watched [Hz];
         ``None``: as in the middle span.
 
     Returns
@@ -454,16 +463,20 @@ def reduce(
         rest_z=np.empty(0),
         rest_roll=np.empty(0),
         rest_y=np.empty(0),
+        bearing=(_bearing_pairs(model, middle) @ basis[:, columns[middle]]).toarray(),
+        bearing_rest=np.empty(0),
         basis=basis,
     )
     bearings = (basis.T @ model.bearing_damping @ basis).toarray()
     rest_z, rest_roll, rest_y = _rest_at_midspan(model, reduced)
+    bearing_rest = _rest_at_bearings(model, reduced)
     return replace(
         reduced,
         relative_damping=_relative_damping(reduced, bearings, cutoff),
         rest_z=rest_z,
         rest_roll=rest_roll,
         rest_y=rest_y,
+        bearing_rest=bearing_rest,
     )
 
 
@@ -544,9 +557,9 @@ def _pruned_to(matrix: sp.csr_array, drop: float) -> sp.csr_array:
 def _relative_damping(
     reduced: ReducedGuideway, bearings: FloatArray, cutoff: float
 ) -> sp.csr_array:
-    """Damping: a given share of critical up to the cut-off, a constant rate beyond.
+    """Damping matrix: a given share of critical up to the cut-off, a constant rate beyond.
 
-    Acts on relative rates, where the matrix is closest to its diagonal.
+    It acts on relative rates, for which the matrix is closest to diagonal.
     """
     mass = reduced.mass.toarray()
     squares, shapes = scipy.linalg.eigh(reduced.stiffness.toarray(), mass)
@@ -588,20 +601,45 @@ def _rest_at_midspan(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Flexibility of midspan to forces on the rails of the middle span by left-out modes [m/N].
 
-    z under the coefficients of z, y under those of roll and of y.
+    z under forces on the coefficients of z, y under forces on those of roll and of y.
     """
+    middle = model.parameters.n_spans // 2
+    at = np.array([(middle + 0.5) * model.parameters.span_length])
+    up, across = (_left_out(model, reduced, row)[0] for row in model.girder_rows(at))
+    z, roll, y = (rows[:, model.span_dof[middle]] for rows in _rail_nodes_rows(model, middle))
+    return z @ up, roll @ across, y @ across
+
+
+def _left_out(
+    model: full.GuidewayModel, reduced: ReducedGuideway, rows: sp.csr_array
+) -> FloatArray:
+    """Motion (row, dof of the span) of places in the middle span under a unit force on each of its
+    degrees of freedom, by the modes that it leaves out; its pier tops stand still."""
     middle = model.parameters.n_spans // 2
     dof, own = model.span_dof[middle], reduced.own_modes(middle)
     shapes = reduced.basis[dof][:, own].toarray()
     square = reduced.stiffness.diagonal()[own]
     factors = scipy.sparse.linalg.splu(model.stiffness[dof][:, dof].tocsc())
-    at = np.array([(middle + 0.5) * model.parameters.span_length])
-    rests = []
-    for row in model.girder_rows(at):
-        here = row[:, dof].toarray().ravel()
-        rests.append(factors.solve(here) - shapes @ (shapes.T @ here / square))
-    z, roll, y = (rows[:, dof] for rows in _rail_nodes_rows(model, middle))
-    return z @ rests[0], roll @ rests[1], y @ rests[1]
+    found = []
+    for here in rows[:, dof].toarray():
+        found.append(factors.solve(here) - shapes @ (shapes.T @ here / square))
+    return np.stack(found)
+
+
+def _bearing_pairs(model: full.GuidewayModel, span: int) -> sp.csr_array:
+    """Rows (4, dof): at either end of a span the mean opening of its two bearings, and half the
+    difference."""
+    right_and_left = 0.5 * np.array([[1.0, 1.0], [1.0, -1.0]])
+    return sp.csr_array(sp.block_diag([right_and_left] * 2) @ model.bearing_rows(span))
+
+
+def _rest_at_bearings(model: full.GuidewayModel, reduced: ReducedGuideway) -> FloatArray:
+    """Flexibility of the middle span's bearings by left-out modes (6, coefficient) [m/N]."""
+    middle = model.parameters.n_spans // 2
+    left_out = _left_out(model, reduced, _bearing_pairs(model, middle))
+    z, roll, y = (rows[:, model.span_dof[middle]] for rows in _rail_nodes_rows(model, middle))
+    pairs = ((left_out[0], left_out[1]), (left_out[2], left_out[3]))
+    return np.stack([one for mean, half in pairs for one in (z @ mean, roll @ half, y @ half)])
 
 
 def _rail_pieces(

@@ -1,8 +1,8 @@
-"""The reference solver: every degree of freedom, Newmark's rule, and an error that is known.
+"""The reference solver: every degree of freedom, Newmark's rule, and a known error.
 
-Written to be read and believed, not to be fast.  It shares with the production solver the physical
-models of train, guideway and track, and no line of the time integration, the magnets or the
-coupling.  What magnets see and do stands in `maglev.mechanics.reference_magnets`, one step in
+It is written to be read and believed, not to be fast.  It shares with the production solver the
+physical models of train, guideway and track, and no code of the time integration, the magnets or
+the coupling.  Magnets stand in `maglev.mechanics.reference_magnets`, one step in
 `maglev.mechanics.reference_step`, whole passages here.  Theory: docs/theory/integration.md,
 "Reference solver".
 """
@@ -23,8 +23,10 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
+from maglev.mechanics.comfort import weighted_rms
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.reference_magnets import Poles
@@ -34,12 +36,14 @@ from maglev.mechanics.responses import (
     Passages,
     acceleration_filter,
     checked_gains,
+    compared_with,
 )
+from maglev.mechanics.statics import largest_deflection
 from maglev.parameters import Config
 
 FIRST_STEP = 0.36e-3
-"""Longest first step [s]: 100 Hz, the upper end of the band, turn by 0.23 in it, which lengthens
-their period by 0.4 %; half of it leaves 0.1 %, the tolerance, before extrapolation."""
+"""Longest first step [s].  At 100 Hz, the upper end of the band, ωΔt = 0.23 lengthens the period by
+0.4 %; half the step leaves 0.1 %, the tolerance, before extrapolation."""
 
 FEWEST_IN_A_PERIOD = 6
 """Fewest first steps in the period of pole passing [-].
@@ -48,21 +52,24 @@ With four, harmonics of the load fold into the band, and the error falls with no
 step: extrapolated from 0.54 and 0.27 ms at 430 km/h, an acceleration was 0.1 % off."""
 
 MOST_HALVINGS = 5
-"""Halvings of the first step after which a passage is given up [-]."""
+"""Largest number of halvings of the first step [-]."""
 
 ERROR = 1e-3
 """Largest estimated error of an extreme, as a share of it [-]."""
 
 CAUTION = 0.5
-"""Estimated error of an extrapolated extreme, as a share of what extrapolation has changed [-].
+"""Estimated error of an extrapolated extreme, as a share of the change by extrapolation [-].
 
-Where that was above 0.1 %, a fifth of it or less was left."""
+Where the change was above 0.1 %, a fifth of it or less was left."""
 
 NEGLIGIBLE = 1e-3
-"""Share of the vertical extreme below which a lateral one is not resolved for its own sake [-]."""
+"""The error of a lateral extreme is relative to at least this share of the vertical one [-]."""
 
 RESPONSES = (*GIRDER_RESPONSES, "car_body_acceleration_z", "car_body_acceleration_y")
 """The six responses whose error is estimated."""
+
+_EXTRAPOLATED = ("girder", "body_z", "body_y", "body_pitch", "body_yaw", "opening")
+"""The histories of a record that are extrapolated."""
 
 _LOG = logging.getLogger(__name__)
 
@@ -75,9 +82,9 @@ class Energy:
     ----------
     time : (step,)
     work_on_train, work_on_guideway : (step, sample)
-        Work of the magnets' forces beyond those at rest on the train, and of all on the rails.
+        Work of the magnets: on the train by forces beyond those at rest, on the rails by all.
     dissipated : (step, sample)
-        In links, bearings and the guideway's damping.
+        Energy dissipated in links, bearings and the guideway's damping.
     stored : (step, sample)
         Kinetic and strain energy of train and guideway.
     """
@@ -99,7 +106,7 @@ class Fate:
 
     @classmethod
     def open(cls, n_samples: int) -> Fate:
-        """All running."""
+        """Fate of samples that are all under way."""
         return cls(
             np.zeros(n_samples, dtype=np.int64),
             np.full(n_samples, np.nan),
@@ -109,7 +116,7 @@ class Fate:
 
 @dataclass
 class Record:
-    """Histories of one run and the end of each passage.
+    """Histories of passages that are computed together, and the end of each.
 
     Attributes
     ----------
@@ -119,22 +126,29 @@ class Record:
         In the order of `GIRDER_RESPONSES` [m, m/s²]; accelerations in their band once finished.
     body_z, body_y : (step, car, sample)
         Accelerations of the car bodies [m/s²].
+    body_pitch, body_yaw : (step, car, sample)
+        Their angular accelerations [rad/s²].
+    opening : (step, 4, sample)
+        Of the middle span's bearings, as in `GuidewayModel.bearing_rows` [m].
     gap_min, gap_max, current_max : (step, kind, sample)
         Over all poles of a kind [m, m, A].
     gap, current : (record, magnet, sample)
         Means of magnets, every so many steps [m, A].
     power : (step, 3, sample)
-        On the train, on the guideway, and what is dissipated [W].
+        On the train, on the guideway, and dissipated [W].
     stored : (step, sample)
         Energy [J].
     fate
-        How it ended.
+        End of each passage.
     """
 
     time: FloatArray
     girder: FloatArray
     body_z: FloatArray
     body_y: FloatArray
+    body_pitch: FloatArray
+    body_yaw: FloatArray
+    opening: FloatArray
     gap_min: FloatArray
     gap_max: FloatArray
     current_max: FloatArray
@@ -146,7 +160,7 @@ class Record:
 
 
 def _blank(of: System, n_steps: int, n_records: int) -> Record:
-    """A record of a train at rest."""
+    """Record of a train at rest."""
     train, n_samples = of.config.train, of.n_samples
     kinds = (train.suspension_magnet, train.guidance_magnet)
     first = np.flatnonzero(np.diff(of.poles.magnet, prepend=-1))
@@ -165,6 +179,9 @@ def _blank(of: System, n_steps: int, n_records: int) -> Record:
         girder=filled(n_steps, np.zeros((4, 1))),
         body_z=filled(n_steps, nothing),
         body_y=filled(n_steps, nothing),
+        body_pitch=filled(n_steps, nothing),
+        body_yaw=filled(n_steps, nothing),
+        opening=filled(n_steps, np.zeros((4, 1))),
         gap_min=filled(n_steps, gap),
         gap_max=filled(n_steps, gap),
         current_max=filled(n_steps, current),
@@ -184,27 +201,28 @@ class Watch:
     ----------
     midspan : csr (2, guideway dof)
         Displacement of midspan of the middle span, down and right [-].
-    body_z, body_y : (car,)
-        Degrees of freedom of the car bodies.
+    bearings : csr (4, guideway dof)
+        Opening of the middle span's bearings [-, m].
+    body : (car, 5)
+        Degrees of freedom of the car bodies: y, z, roll, pitch, yaw.
     per_magnet : csr (magnet, pole)
         Mean of the poles of each magnet [-].
     """
 
     midspan: sp.csr_array
-    body_z: IntArray
-    body_y: IntArray
+    bearings: sp.csr_array
+    body: IntArray
     per_magnet: sp.csr_array
 
 
 def watch(config: Config, model: guideway_model.GuidewayModel, poles: Poles) -> Watch:
     """Find the rows and degrees of freedom of the responses."""
     middle = (config.guideway.n_spans // 2 + 0.5) * config.guideway.span_length
-    body = train_model.build(config.train).car_body_dof
     share = 1 / np.bincount(poles.magnet)[poles.magnet]
     return Watch(
         midspan=sp.csr_array(sp.vstack(model.girder_rows(np.array([middle])))),
-        body_z=body[:, 1],
-        body_y=body[:, 0],
+        bearings=model.bearing_rows(config.guideway.n_spans // 2),
+        body=train_model.build(config.train).car_body_dof,
         per_magnet=sp.csr_array((share, (poles.magnet, np.arange(poles.magnet.size)))),
     )
 
@@ -213,7 +231,11 @@ def _note(record: Record, step: int, every: int, of: System, at: Watch, state: S
     """Record the responses of a step."""
     record.girder[step, :2] = at.midspan @ state.guideway.x
     record.girder[step, 2:] = at.midspan @ state.guideway.a
-    record.body_z[step], record.body_y[step] = state.train.a[at.body_z], state.train.a[at.body_y]
+    of_bodies = (record.body_y, record.body_z, None, record.body_pitch, record.body_yaw)
+    for column, history in enumerate(of_bodies):
+        if history is not None:
+            history[step] = state.train.a[at.body[:, column]]
+    record.opening[step] = at.bearings @ state.guideway.x
     gap, current = state.magnets.gap, state.magnets.current
     for kind in range(2):
         of_kind = of.poles.is_guidance == bool(kind)
@@ -228,12 +250,12 @@ def _note(record: Record, step: int, every: int, of: System, at: Watch, state: S
 def _power(of: System, state: State) -> FloatArray:
     """Power of the magnets on train and guideway, and dissipated power [W], (3, sample)."""
     v_t, v_g = state.train.v, state.guideway.v
-    lost = of.train.dissipated(v_t) + of.guideway.dissipated(v_g)
+    dissipated = of.train.dissipated(v_t) + of.guideway.dissipated(v_g)
     on_train, on_guideway = (
         (state.on_train * v_t).sum(axis=0),
         (state.on_guideway * v_g).sum(axis=0),
     )
-    return np.stack([on_train, on_guideway, lost])
+    return np.stack([on_train, on_guideway, dissipated])
 
 
 def _stored(of: System, state: State) -> FloatArray:
@@ -246,7 +268,7 @@ def _stored(of: System, state: State) -> FloatArray:
 
 
 def _judge(fate: Fate, of: System, state: State, time: float) -> None:
-    """Mark the samples that lose levitation; they stay at rest from then on."""
+    """Set the end of samples that lose levitation; they rest from then on."""
     gap, passage = state.magnets.gap, of.config.passage
     lost = (fate.status == 0) & ~held(of, state.magnets)
     for sample in np.flatnonzero(lost):
@@ -333,7 +355,7 @@ def passed(
 
 
 def energy_of(record: Record) -> Energy:
-    """The energy account of a run."""
+    """Energy account of a record."""
     step = record.time[0]
     before = np.concatenate([np.zeros_like(record.power[:1]), record.power[:-1]])
     work = np.cumsum(0.5 * step * (before + record.power), axis=0)
@@ -355,7 +377,7 @@ def integrate(
     Parameters
     ----------
     config
-        Parameters of everything; the step is `maglev.mechanics.course.time_step`.
+        Parameters of everything; the step is that of `maglev.mechanics.course`.
     profile
         Track irregularity.
     gains : (sample, 4) or (sample, 8)
@@ -370,14 +392,12 @@ def integrate(
     passages
         Extremes, outcomes and histories.
     energy
-        Where the energy went.
+        Account of the energy.
 
     Raises
     ------
     UserError
-        If the gains have the wrong shape or are not finite.
-    RuntimeError
-        If a step does not converge.
+        If the gains have the wrong shape or are not finite, or if a step does not converge.
 
     References
     ----------
@@ -394,7 +414,7 @@ def integrate(
         energy=True,
         progress=progress,
     )
-    return passages_of(record, record_every), energy_of(record)
+    return passages_of(record, config, record_every), energy_of(record)
 
 
 @dataclass(frozen=True)
@@ -418,7 +438,7 @@ class Effort:
 
     @property
     def attributes(self) -> dict[str, float | int]:
-        """For a dataset: the step, how many, the largest estimated error, the seconds."""
+        """Attributes of a dataset: step, number of steps, largest estimated error, seconds."""
         return {
             "time_step": self.step,
             "n_steps": self.n_steps,
@@ -439,16 +459,16 @@ def solve(
 ) -> tuple[Passages, Effort]:
     """Run one passage per row of gains; halve the step until the extremes converge.
 
-    Newmark's rule is of second order, and so are the histories of a run: of two runs, with Δt and
-    Δt/2, a third of the difference is the error of the finer one and is taken off it.  Half of that
-    third is the estimate of what is left, until there are three runs: then what the third run has
-    changed is, or an eighth of the third if that is more.  Poles that are points always take three
-    runs: they strike the rails at joints, and the error falls with no fixed power of the step.
+    Newmark's rule is of second order.  Of two solutions, with steps Δt and Δt/2, a third of the
+    difference is the error of the finer one and is subtracted.  The error left is estimated as half
+    of that third; with a third solution, as the change that it brings, or an eighth of the third if
+    that is more.  Poles that are points always take three solutions: they strike the rails at
+    joints, and the error falls with no fixed power of the step.
 
     Parameters
     ----------
     config
-        Parameters of everything; ``passage.time_step`` only decides where the run starts.
+        Parameters of everything; ``passage.time_step`` only decides where the passage starts.
     profile
         Track irregularity.
     gains : (sample, 4) or (sample, 8)
@@ -465,14 +485,13 @@ def solve(
     passages
         Extremes, outcomes and histories.
     effort
-        The step it took, the estimated errors, the seconds.
+        Last step, estimated errors and computing time.
 
     Raises
     ------
     UserError
-        If the gains have the wrong shape or are not finite.
-    RuntimeError
-        If a step does not converge, or if the error is above the tolerance with the shortest step.
+        If the gains have the wrong shape or are not finite, a step does not converge, or the error
+        exceeds the tolerance even with the shortest step.
 
     References
     ----------
@@ -496,25 +515,25 @@ def solve(
         effort = Effort(h, n, error, perf_counter() - began)
         _LOG.info("reference: %s", _told(effort))
         if not (error > tolerance).any() and (before is not None or have_faces):
-            return passages_of(better, rows), effort
+            return passages_of(better, config, rows), effort
         coarse, before = fine, six_extremes(better)
-    raise RuntimeError(
+    raise UserError(
         f"reference: expected errors of at most {100 * tolerance:g} %, got {_told(effort)}; "
         "raw accelerations may have no limit: give passage.acceleration_band"
     )
 
 
 def extrapolated(coarse: Record, fine: Record) -> Record:
-    """Richardson extrapolation of the responses from two runs, one with twice the step."""
+    """Richardson extrapolation of the responses from two records, one with twice the step."""
 
     def better(name: str) -> FloatArray:
         one, other = getattr(coarse, name), getattr(fine, name)
         correction = (other[1::2] - one) / 3
         return other + CubicSpline(coarse.time, correction)(fine.time)
 
-    lost = np.where(coarse.fate.status != 0, coarse.fate.status, fine.fate.status)
-    fate = replace(fine.fate, status=lost) if (lost != fine.fate.status).any() else fine.fate
-    changed = {name: better(name) for name in ("girder", "body_z", "body_y")}
+    status = np.where(coarse.fate.status != 0, coarse.fate.status, fine.fate.status)
+    fate = replace(fine.fate, status=status) if (status != fine.fate.status).any() else fine.fate
+    changed = {name: better(name) for name in _EXTRAPOLATED}
     return replace(fine, fate=fate, **changed)
 
 
@@ -536,7 +555,7 @@ def _estimated_error(better: FloatArray, fine: FloatArray, before: FloatArray | 
     better, fine
         With and without extrapolation.
     before
-        Extrapolated from steps twice as long, if there were any.
+        Extrapolated from steps twice as long, where there is such a solution.
     """
     error = CAUTION * np.abs(better - fine)
     if before is not None:
@@ -562,9 +581,29 @@ def _worst(error: FloatArray) -> FloatArray:
     return np.where(np.isnan(error), 0.0, error).max(axis=0)
 
 
-def passages_of(record: Record, every: int) -> Passages:
-    """Extremes, outcomes and thinned histories of a run."""
+def _at_ends(middle: FloatArray, turn: FloatArray, arm: float) -> FloatArray:
+    """Accelerations (step, end, car, sample) at both ends of the cars' floors."""
+    return np.stack([middle + arm * turn, middle - arm * turn], axis=1)
+
+
+def passages_of(record: Record, config: Config, every: int) -> Passages:
+    """Extremes, outcomes and thinned histories of a record."""
     status = record.fate.status
+    arm = config.train.end_distance
+    ends = (
+        _at_ends(record.body_z, record.body_pitch, -arm),
+        _at_ends(record.body_y, record.body_yaw, arm),
+    )
+    (end_z, end_z_time), (end_y, end_y_time) = (
+        _largest(*extremes(history, record.time, status), axis=2) for history in ends
+    )
+    one_way, other_way = (
+        _one_sided(sign * record.girder, record.time, status)[0] for sign in (1.0, -1.0)
+    )
+    lift, lift_time = _largest(*_one_sided(record.opening, record.time, status), axis=1)
+    weighted = weighted_rms(config, record.time, ends)
+    weighted[status != 0] = np.nan
+    models = guideway_model.build(config.guideway), train_model.build(config.train)
     girder, girder_time = extremes(record.girder, record.time, status)
     body_z, body_z_time = extremes(record.body_z, record.time, status)
     body_y, body_y_time = extremes(record.body_y, record.time, status)
@@ -576,6 +615,16 @@ def passages_of(record: Record, every: int) -> Passages:
     return Passages(
         girder=girder,
         girder_time=girder_time,
+        girder_positive=one_way,
+        girder_negative=other_way,
+        end_z=end_z,
+        end_y=end_y,
+        end_z_time=end_z_time,
+        end_y_time=end_y_time,
+        weighted=weighted,
+        lift=lift,
+        lift_time=lift_time,
+        **compared_with(config, largest_deflection(*models), status.size),
         body_z=body_z,
         body_y=body_y,
         body_z_time=body_z_time,
@@ -595,15 +644,33 @@ def passages_of(record: Record, every: int) -> Passages:
     )
 
 
+def _one_sided(
+    history: FloatArray, time: FloatArray, status: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """As `extremes`, of values above zero alone; the last value may be the largest."""
+    above = np.maximum(history, 0.0)
+    value, when = extremes(above, time, status)
+    last = above[-1].T >= above.max(axis=0).T
+    ends = last & (status == 0).reshape(-1, *[1] * (value.ndim - 1)) & (above[-1].T > 0)
+    return np.where(ends, above[-1].T, value), np.where(ends, time[-1], when)
+
+
+def _largest(value: FloatArray, when: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
+    """Largest of the values along an axis, and when it was; NaN for lost samples."""
+    at = np.expand_dims(np.where(np.isnan(value), -1.0, value).argmax(axis), axis)
+    largest, its_time = (np.take_along_axis(one, at, axis).squeeze(axis) for one in (value, when))
+    return largest, its_time
+
+
 def extremes(
     history: FloatArray, time: FloatArray, status: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Largest absolute values: vertices of parabolas through three steps.
+    """Largest absolute values, as vertices of parabolas through three steps.
 
     Parameters
     ----------
     history : (step, ..., sample)
-        What is watched.
+        Histories of responses.
     time : (step,)
         Of the steps [s].
     status : (sample,)

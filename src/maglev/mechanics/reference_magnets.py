@@ -33,9 +33,9 @@ class Poles:
     Attributes
     ----------
     magnet : (pole,)
-        Number in the train's table of magnets.
+        Row in the train's table of magnets.
     x, face : (pole,)
-        Place of the centre relative to the train's nose, and length of the face [m].
+        Centre relative to the train's nose, and length of the face [m].
     is_guidance, side : (pole,)
         Kind, and +1 right or -1 left.
     opening : (pole,)
@@ -129,14 +129,14 @@ class Rails:
     def under(self, x: FloatArray, speed: float, step: float) -> tuple[sp.csr_array, sp.csr_array]:
         """Rows of the mean rail deflection under the faces of poles.
 
-        What jumps where a joint passes counts with its mean over one step, so that its impulse does
-        not hang on where in a step the joint is met: the difference of a face's edges, and all that
-        a point sees.  For what does not jump that is an error of second order, like the step's.
+        Terms that jump at joints (the difference between the edges of a face, and all terms of a
+        point) are averaged over one step, so that their impulse does not depend on where in the
+        step the joint is met.  For smooth terms this is an error of second order, like the step's.
 
         Parameters
         ----------
         x : (time, pole)
-            Places of the poles' centres [m].
+            Positions of the poles' centres [m].
         speed, step
             Of the train [m/s], and Δt [s].
 
@@ -145,7 +145,7 @@ class Rails:
         mean : csr (time pole, end)
             Mean deflection over each face, as share of the elements' ends [-, m].
         travel : csr (time pole, end)
-            What its rate has because the pole travels [1/s, m/s].
+            Part of its rate that is due to travel [1/s, m/s].
         """
         deflection, slope = timoshenko.deflection_shape, timoshenko.slope_shape
         face, advance = np.tile(self.face, x.shape[0]), speed * step
@@ -233,14 +233,14 @@ class Circuits:
     drive : csr (pole, circuit)
         Weight of each circuit's current in a pole's [-].
     force_gap : csr (pole, pole)
-        Weight of each pole's gap in the gap that a pole's force goes by [-].
+        Weight of each pole's gap in the gap that gives a pole's force [-].
     proportional, derivative, acceleration, integral : (circuit, sample)
         k_p [A/m], k_d [A s/m], k_a [A s²/m], k_i [A/(m s)].
     decay, newest : (circuit, 1)
-        A current after a step: ``decay`` times the last, ``newest`` times the newest command, the
-        rest times the command before [-].
+        Weights of the last current and of the newest command in the new current [-]; the rest is
+        the weight of the command before.
     taps
-        Delay: how many steps back, and with which weight (circuit, 1), a signal counts [-].
+        Delay: weight (circuit, 1) of a signal by how many steps back it was stored [-].
     current, current_max : (circuit, 1)
         i₀ and largest command [A].
     step
@@ -377,7 +377,7 @@ def circuits_of(config: Config, poles: Poles, gains: FloatArray, step: float) ->
 
 
 def resting(circuits: Circuits) -> Charge:
-    """State of the circuits before the run: no signal, currents at their reference."""
+    """State of the circuits before the passage: no signal, currents at their reference."""
     zero = np.zeros_like(circuits.proportional)
     depth = max(back for back, _ in circuits.taps) + 1
     rest = circuits.current + zero
@@ -397,7 +397,7 @@ def charged(
     Parameters
     ----------
     circuits, before
-        The circuits, and where they were a step ago.
+        The circuits, and their state a step ago.
     known : (circuit, sample)
         From `Circuits.delayed` [A].
     error, rate, push : (circuit, sample)
@@ -406,9 +406,9 @@ def charged(
     Returns
     -------
     now
-        Where the circuits are; its signals are those of ``before``.
+        New state of the circuits; its signals are those of ``before``.
     signal : (circuit, sample)
-        u, to be stored once the step is found [A].
+        u, to be stored once the step has converged [A].
     """
     integral = before.integral + 0.5 * circuits.step * (before.error + error)
     signal = circuits.proportional * error + circuits.derivative * rate

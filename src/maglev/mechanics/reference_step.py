@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
 from maglev.arrays import BoolArray, FloatArray
+from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics.course import course
@@ -38,13 +39,13 @@ TOLERANCE = 1e-6
 iteration leaves about a hundredth, so that what remains is some 1e-8."""
 
 MOST_ITERATIONS = 30
-"""Iterations of one step after which the run is given up [-]; three or four are usual."""
+"""Largest number of iterations of one step [-]; three or four are usual."""
 
 BLOCK = 64
-"""Steps whose view of the track is found at once [-]."""
+"""Steps whose view of the track is computed in one block [-]."""
 
 FRESH_TANGENT_EVERY = 6
-"""Iterations after which the tangent of the magnets is taken anew, where they are [-]."""
+"""Iterations after which the tangent of the magnets is updated [-]."""
 
 
 @dataclass
@@ -72,13 +73,13 @@ class Structure:
     step
         Δt [s].
     effective : csc (dof, dof)
-        M + γ Δt C + β Δt² K: what an acceleration at the end of the step meets.
+        M + γ Δt C + β Δt² K, the effective mass for an acceleration at the end of the step.
     factors
         Of the effective mass.
     modes, coefficient : (mode, dof), (mode, 1)
         Damping of low rank on top, Σ c_k m_k m_kᵀ with m_k = M φ_k.
     spread, gathered : (mode, dof), (mode, mode)
-        What the low rank adds to the inverse, by the formula of Sherman, Morrison and Woodbury.
+        Low-rank part of the inverse, by the formula of Sherman, Morrison and Woodbury.
     """
 
     mass: sp.csr_array
@@ -107,11 +108,11 @@ class Structure:
         return a
 
     def dissipated(self, v: FloatArray) -> FloatArray:
-        """Power lost to damping (sample,) [W]."""
-        lost = (v * (self.damping @ v)).sum(axis=0)
+        """Power dissipated by damping (sample,) [W]."""
+        power = (v * (self.damping @ v)).sum(axis=0)
         if self.coefficient.size:
-            lost += (self.coefficient * (self.modes @ v) ** 2).sum(axis=0)
-        return lost
+            power += (self.coefficient * (self.modes @ v) ** 2).sum(axis=0)
+        return power
 
     def predicted(self, before: Motion) -> Motion:
         """Predictor: the motion a step later without its acceleration."""
@@ -156,7 +157,7 @@ def _factors(matrix: sp.csc_array) -> SuperLU:
 
 @dataclass(frozen=True)
 class System:
-    """Constant data of a run with one step length.
+    """Constant data of passages with one step length.
 
     Attributes
     ----------
@@ -167,7 +168,7 @@ class System:
     train, guideway
         The structures.
     poles, rails, track, circuits
-        What the magnets are, see and do.
+        Poles of the magnets, rails and track under them, circuits.
     """
 
     config: Config
@@ -192,7 +193,7 @@ def system(
     gains: FloatArray,
     step: float,
 ) -> System:
-    """Constant data of runs with one step length [s] and gains (sample, 8)."""
+    """Constant data of passages with one step length [s] and gains (sample, 8)."""
     train = train_model.build(config.train)
     poles = poles_of(train)
     mass = sp.csr_array(sp.diags_array(train.mass))
@@ -222,7 +223,7 @@ class Magnets:
 
 @dataclass
 class State:
-    """State of a run at the end of a step.
+    """State of all passages at the end of a step.
 
     Attributes
     ----------
@@ -272,8 +273,8 @@ def at_rest(of: System) -> State:
 def closed_train(of: System, magnets: Magnets, sample: int) -> SuperLU:
     """Factors of the effective mass of the train with its circuits closed, for one sample.
 
-    The effective mass plus the derivative of the magnets' forces to the accelerations at the end of
-    the step, where the magnets are; only the way to a step's solution depends on it.
+    The effective mass plus the derivative of the magnets' forces by the accelerations at the end
+    of the step, at the present gaps.  It affects only the number of iterations.
     """
     h, circuits, opens = of.step, of.circuits, of.poles.opens
     gap, current, force = (x[:, sample] for x in (magnets.gap, magnets.current, magnets.force))
@@ -296,16 +297,16 @@ def stepped(of: System, state: State, view: View, running: BoolArray) -> State:
     Parameters
     ----------
     of, state
-        The system, and where it is.
+        The system, and its state.
     view
-        What the poles see at the end of the step.
+        Rails and track under the poles at the end of the step.
     running : (sample,)
-        Samples whose forces must stay.
+        Samples whose forces must converge.
 
     Raises
     ------
-    RuntimeError
-        If the forces do not stay.
+    UserError
+        If the pole forces do not converge.
     """
     train, guideway = of.train.predicted(state.train), of.guideway.predicted(state.guideway)
     inner_train = of.train.inner(train)
@@ -333,9 +334,9 @@ def stepped(of: System, state: State, view: View, running: BoolArray) -> State:
         if iteration % FRESH_TANGENT_EVERY == 0:
             tangents = [closed_train(of, magnets, k) for k in range(of.n_samples)]
     else:
-        raise RuntimeError(
-            f"the pole forces did not converge within {MOST_ITERATIONS} iterations at "
-            f"t = {view.time:.4f} s; take a smaller passage.time_step"
+        raise UserError(
+            f"reference: the pole forces must converge in {MOST_ITERATIONS} iterations a step, and "
+            f"did not at t = {view.time:.4f} s; take a smaller step or the production solver"
         )
     charge.signals.append(signal)
     return State(now_t, now_g, charge, magnets, on_train, on_guideway, before, state.tangents)
@@ -348,13 +349,13 @@ class View:
     Attributes
     ----------
     time
-        Which [s].
+        Time [s].
     bump, bump_rate : (pole, 1)
         Mean irregularity over the faces [m] and its rate [m/s].
     mean, travel : csr (pole, end)
         From `Rails.under`.
     reached
-        Whether any face has come to the guideway, which rests until then.
+        Whether any face has reached the guideway, which rests until then.
     """
 
     time: float
@@ -366,7 +367,7 @@ class View:
 
 
 def views(of: System, first: int, stop: int) -> Iterator[View]:
-    """Rails and track under the poles after steps ``first`` to ``stop``, found in blocks."""
+    """Rails and track under the poles after steps ``first`` to ``stop``, computed in blocks."""
     speed, n = of.config.passage.speed, of.poles.x.size
     for begin in range(first, stop, BLOCK):
         time = (np.arange(begin, min(begin + BLOCK, stop)) + 1) * of.step

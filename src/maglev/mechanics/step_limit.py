@@ -21,7 +21,7 @@ from maglev.mechanics.reduction import ReducedGuideway
 from maglev.parameters import Config
 
 DAMPING_MARGIN = 1.4
-"""Damping ratio of a component mode on its own over that of the guideway's modes, at most [-];
+"""Largest damping ratio of a component mode on its own over that of the guideway's modes [-];
 measured 1.25 with the default parameters."""
 
 GUIDEWAY_MARGIN = 0.92
@@ -33,12 +33,12 @@ TRAIN_MARGIN = 0.88
 rising k_d of the suspension with the default parameters."""
 
 GROWTH_OF_THE_STEP = 2.0
-"""Growth of a motion by the step alone, beyond that of the train, that makes the step too large
-[1/s]; assumed: in a passage of three seconds a motion then grows by a factor of 400."""
+"""Numerical growth of a motion, beyond its physical growth, above which a step is too large [1/s];
+assumed: in a passage of three seconds a motion then grows by a factor of 400."""
 
 
 SAFE_MULTIPLES = (1.8, 1.4, 1.2, 1.0)
-"""Multiples of the mean gains that are tried, from large to small [-]; assumed."""
+"""Trial multiples of the mean gains, from large to small [-]; assumed."""
 
 
 def guideway_limit(config: Config, reduced: ReducedGuideway, time_step: float) -> float:
@@ -77,7 +77,7 @@ def train_parts(config: Config) -> tuple[Block, ...]:
 
 
 def train_limit(parts: tuple[Block, ...], gains: FloatArray, least: float = 1e-5) -> float:
-    """Largest step at which no motion of the train grows by the step alone [s].
+    """Largest step at which no motion of the train grows numerically [s].
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def train_limit(parts: tuple[Block, ...], gains: FloatArray, least: float = 1e-5
     gains : (8,)
         Suspension k_p, k_d, guidance k_p, k_d, suspension k_a, k_i, guidance k_a, k_i.
     least
-        Below this no limit is looked for [s].
+        Smallest step that is tried [s].
     """
     stable, too_large = least, 2 * least
     while step_holds(parts, gains, too_large) and too_large < 0.1:
@@ -103,8 +103,8 @@ def train_limit(parts: tuple[Block, ...], gains: FloatArray, least: float = 1e-5
 def step_holds(parts: tuple[Block, ...], gains: FloatArray, time_step: float) -> bool:
     """Whether each motion that decays in continuous time also decays in the scheme.
 
-    The step tried is longer by a margin: the elastic guideway leaves less room than the rigid track
-    of the linearised train.
+    The trial step is longer by a margin, because the limit on the elastic guideway is lower than on
+    the rigid track of the linearised train.
     """
     tried = time_step / TRAIN_MARGIN
     for block in parts:
@@ -118,7 +118,7 @@ def step_holds(parts: tuple[Block, ...], gains: FloatArray, time_step: float) ->
 
 
 def _of_use(matrix: FloatArray) -> FloatArray:
-    """The matrix without states that influence no other."""
+    """The matrix without the states that influence no other state."""
     while not (kept := matrix.any(axis=0)).all():
         matrix = matrix[np.ix_(kept, kept)]
     return matrix
@@ -137,8 +137,8 @@ def samples_too_fast(
 ) -> BoolArray:
     """Samples whose gains exceed the stability limit of the step.
 
-    The larger a gain the shorter the step must be: a set of samples whose largest gains, all
-    together, pass needs no closer look, and is halved if they do not.
+    The limit falls as gains rise: a set of samples passes as a whole if its largest gains pass
+    together; otherwise it is halved.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def samples_too_fast(
     time_step
         Δt [s].
     safe : (8,)
-        From `safe_gains`: samples with no gain above it pass.
+        From `safe_gains`: samples with no gain above these pass.
 
     Returns
     -------
@@ -177,7 +177,7 @@ def step_matrix(block: Block, gains: FloatArray, time_step: float) -> FloatArray
     """Transition matrix of a block of the linearised train over one step.
 
     The state is displacement, velocity half a step before, and the accelerations of the last two
-    steps; of the magnets' freedoms also what the circuits remember: the integral and the error, the
+    steps; of the magnets' freedoms also the memory of the circuits: the integral and the error, the
     command and the current where they lag, and the signals of the steps within the delay.  A
     circuit's gain on the acceleration acts on that of the same step.
 
@@ -236,7 +236,7 @@ def step_matrix(block: Block, gains: FloatArray, time_step: float) -> FloatArray
 def _largest_phase(ratio: float, *, exact: bool = False) -> float:
     """Largest stable ωΔt of an oscillator with this damping ratio [-].
 
-    ``exact`` takes it as a component mode, which is stepped with its response and damping.
+    ``exact`` is for a component mode, which is stepped with its own response and damping.
     """
     phases = np.arange(0.02, np.pi, 0.02)
     scale, rate = np.ones_like(phases), 2 * ratio * phases
@@ -265,8 +265,8 @@ def stepped_stiffness(reduced: ReducedGuideway) -> FloatArray:
 def stepped_inertia(reduced: ReducedGuideway, time_step: float) -> FloatArray:
     """Symmetric mass (coordinate, coordinate) of a time step, for `stepped_stiffness`.
 
-    A component mode has the inverse of its response as the mass of its own motion, and the pier
-    tops a share of their stiffness on top of their mass.  The step itself is not symmetric: pier
+    A component mode has the inverse of its response as its own mass; pier tops have a share of
+    their stiffness added to their mass.  The step itself is not symmetric: pier
     tops feel the modes' forces without their response (docs/theory/integration.md, eq. 4).
     """
     carried = reduced.carried.toarray()
@@ -279,8 +279,8 @@ def step_response(reduced: ReducedGuideway, time_step: float) -> FloatArray:
     """Factor on the acceleration of each component mode in a step; one for pier tops.
 
     Verlet's step with sinc²(ωΔt/2) times the acceleration is exact for an undamped mode of circular
-    frequency ω on its own, whatever the force at the steps.  Pier tops have a mass for the same
-    (`maglev.mechanics.activity.stepped_mass`).
+    frequency ω on its own, whatever the force at the steps.  The mass of the pier tops serves the
+    same end (`maglev.mechanics.activity.stepped_mass`).
 
     Parameters
     ----------

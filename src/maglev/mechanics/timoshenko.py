@@ -5,7 +5,7 @@ order x, y, z, roll φ, pitch θ, yaw ψ, all small and right-handed, so that a 
 further on moves by ``u_y = ψ dx`` and ``u_z = -θ dx``.  Deflection (cubic) and section rotation
 (quadratic) are interpolated together from the homogeneous static solution: the element does not
 lock, and it is exact for loads at its nodes.  Its shear strain is uniform, so frequencies converge
-with the square of its length, and with the fourth power where shear counts for nothing.  Theory:
+with the square of its length, and with the fourth power where shear is negligible.  Theory:
 docs/theory/guideway.md.
 """
 
@@ -19,7 +19,7 @@ from maglev.errors import UserError
 from maglev.parameters import BeamSection
 
 X, Y, Z, ROLL, PITCH, YAW = range(6)
-"""Places of a node's degrees of freedom."""
+"""Indices of a node's degrees of freedom."""
 
 _VERTICAL = np.array([Z, PITCH, 6 + Z, 6 + PITCH])
 _VERTICAL_SIGN = np.array([1.0, -1.0, 1.0, -1.0])  # du_z/dx = -θ
@@ -134,7 +134,7 @@ def slope_shape(length: npt.ArrayLike, phi: npt.ArrayLike, x: npt.ArrayLike) -> 
 
 
 def rotation_shape(length: npt.ArrayLike, phi: npt.ArrayLike, x: npt.ArrayLike) -> FloatArray:
-    """Shape functions of the section's rotation in one plane, positive where it lifts dw/dx.
+    """Shape functions of the section's rotation in one plane, of the sign of dw/dx.
 
     Parameters
     ----------

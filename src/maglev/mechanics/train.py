@@ -48,7 +48,7 @@ class MagnetTable:
     static_force : (magnet,)
         Sum of the pole forces at rest [N]: upwards, or towards the guide rail.
     static_moment : (magnet,)
-        Sum of pole force times its place ahead of the centre at rest [N m]: positive where the
+        Sum of pole force times its distance ahead of the centre at rest [N m]: positive where the
         front half carries more.  The generalised force of the poles on theta.
     car : (magnet,)
         Car of the magnet; one shared by two cars belongs to the car in front.
@@ -71,7 +71,7 @@ class TrainModel:
     Attributes
     ----------
     parameters
-        What it was built from.
+        Parameters of the train.
     mass : (dof,)
         Diagonal of the mass matrix [kg, kg m^2].
     stiffness : (dof, dof)
@@ -85,7 +85,7 @@ class TrainModel:
     weight : (dof,)
         Weight on each degree of freedom, downwards [N].
     magnets
-        Where the magnets are and what they carry.
+        Positions, degrees of freedom and static forces of the magnets.
     car_body_dof : (car, 5)
         Indices of each car body's y, z, phi, theta, psi.
     dof_names
@@ -190,7 +190,7 @@ def build(train: Train) -> TrainModel:
 
 
 def pole_offsets(magnet: Magnet) -> FloatArray:
-    """Places of a magnet's poles ahead of its centre, from the front.
+    """Positions of a magnet's poles ahead of its centre, from the front.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
 
 
 def _checked_preload(train: Train) -> float:
-    """Force of a guidance magnet at rest [N]; what the suspension magnets carry is not given."""
+    """Force of a guidance magnet at rest [N]; suspension magnets take theirs from the weight."""
     preload = train.guidance_magnet.preload
     if preload is None or not preload > 0:
         raise UserError(
@@ -290,7 +290,7 @@ def _magnet_table(
     weight: FloatArray,
     preload: float,
 ) -> MagnetTable:
-    """Collect the magnets and find the force and moment of each with all of them held still."""
+    """Collect the magnets, and compute force and moment of each with all of them held still."""
     is_guidance = np.array([magnet.is_guidance for _, magnet in magnets])
     car = np.array([number for number, _ in magnets])
     station = np.array([magnet.station for _, magnet in magnets])

@@ -10,17 +10,17 @@ import xarray as xr
 
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import coordinates, extremes, lost, method_number
+from maglev.stages.extremes import coordinates, extremes, lost
 from maglev.stages.limits import baseline_limits
-from maglev.stages.reads import PREDICTING, SURROGATE_OF_METHODS
+from maglev.stages.reads import PREDICTING, RESPONSES_OF_STUDY, SURROGATE_OF_METHODS
 from maglev.stages.surrogate import predictor
 from maglev.uncertainty.reliability import sample_limits
-from maglev.vocabulary import METHODS, RESPONSES
+from maglev.vocabulary import METHODS
 
 _LOG = logging.getLogger(__name__)
 
 N_STEPS = 12
-"""Numbers of runs at which a method is judged, about; assumed."""
+"""Approximate number of sizes at which a method is judged; assumed."""
 
 PAPER_N_RUNS = 273
 """Number of runs for which the paper gives root mean square errors."""
@@ -61,9 +61,9 @@ def steps(designs: Mapping[str, xr.Dataset]) -> dict[str, list[int]]:
 def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Compare every method with the baseline for growing numbers of runs.
 
-    Surrogates are evaluated at the baseline's own points, so that its sampling noise, which both
-    have in common, is not in the differences.  It is in the truth: half the interval of each of
-    the baseline's limits stands beside them.
+    Surrogates are evaluated at the points of the baseline, so its sampling noise cancels in the
+    differences.  The noise of the baseline's limits themselves is half their interval, which the
+    file also holds.
 
     Parameters
     ----------
@@ -86,7 +86,8 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
         If a design cannot be fitted.
     """
     levels = config.study.failure_probability
-    truth, away = extremes(baseline), lost(baseline)
+    responses = config.responses_of_study
+    truth, away = extremes(baseline, responses), lost(baseline)
     points = baseline["standard"].to_numpy()
     sigma = truth[~away].std(axis=0)
     reference = baseline_limits(config, truth, away)
@@ -101,7 +102,7 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
 
     sizes = steps(design)
     n_steps = max(len(one) for one in sizes.values())
-    shape = (len(design), n_steps, len(RESPONSES))
+    shape = (len(design), n_steps, len(responses))
     n_runs = np.zeros(shape[:2], dtype=int)
     rmse, error = np.full(shape, np.nan), np.full(shape, np.nan)
     share = np.full(shape[:2], np.nan)
@@ -114,7 +115,7 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
             part = design[name].isel(sample=slice(0, n))
             if np.count_nonzero(~lost(part)) < part.sizes["parameter"] + 3:
                 continue  # no linear tail with one sample left out
-            found = predictor(config, part, choice)
+            found = predictor(config, part, choice, responses)
             predicted, held = found.surrogate.predict(points), found.held(points)
             rmse[row, step] = np.sqrt(np.mean((predicted - truth)[~away] ** 2, axis=0))
             share[row, step] = 1.0 - held.mean()
@@ -123,13 +124,15 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
             following = following.isel(sample=~lost(following))
             if complete and following.sizes["sample"]:
                 ahead = found.surrogate.predict(following["standard"].to_numpy())
-                error[row, step] = np.abs(ahead - extremes(following)).max(axis=0) / sigma
+                error[row, step] = (
+                    np.abs(ahead - extremes(following, responses)).max(axis=0) / sigma
+                )
             if not held.any():
                 continue
             for of, without in ((limit, int(np.count_nonzero(~held))), (held_limit, 0)):
                 of[row, step] = [
                     sample_limits(predicted[held, response], levels, n_lost=without).limit
-                    for response in range(len(RESPONSES))
+                    for response in range(len(responses))
                 ]
         _LOG.info("%s: judged at %s runs", name, ", ".join(map(str, sizes[name])))
     of_step = ("method", "step", "response")
@@ -156,7 +159,8 @@ def dataset(config: Config, baseline: xr.Dataset, design: Mapping[str, xr.Datase
             "sigma": ("response", sigma),
         },
         coords=coordinates(
-            method=np.array([method_number(name) for name in names]),
+            responses,
+            method=names,
             step=np.arange(n_steps),
             failure_probability=list(levels),
         ),
@@ -168,6 +172,7 @@ STAGE = Stage(
     of="case",
     reads=(
         *PREDICTING,
+        *RESPONSES_OF_STUDY,
         *SURROGATE_OF_METHODS,
         "study.failure_probability",
         "study.asm.batch_size",

@@ -10,7 +10,7 @@ import xarray as xr
 from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Stage
-from maglev.stages.points import baseline, case_of, track_seeds
+from maglev.stages.points import baseline, seeds_of_tracks
 from maglev.stages.reads import RUNS_OF_CASE
 from maglev.stages.runs import runs
 from maglev.vocabulary import BASELINE
@@ -28,7 +28,7 @@ def dataset(
     case
         Name of the case.
     start, stop
-        Number of the first sample and of that after the last; how many the baseline has plays no
+        Number of the first sample and of the one after the last; the size of the baseline plays no
         part.
     store
         Folder of the store.
@@ -38,8 +38,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``runs``, with ``track_seed`` if the case has a random track; each sample under its
-        number in the baseline, all equally likely.
+        Layout ``runs``, with ``track_seed`` if runs of the case differ in their track; each sample
+        under its number in the baseline, all equally likely.
 
     Raises
     ------
@@ -49,16 +49,14 @@ def dataset(
     if not 0 <= start < stop:
         raise UserError(f"samples must be numbered upwards from 0 or more, got {start} to {stop}")
     rows = range(start, stop)
-    seeds = None
-    if case_of(config, case).random_track:
-        seeds = track_seeds(config, rows.stop)[rows.start :]
+    seeds = seeds_of_tracks(config, case, rows.stop)
     result = runs(
         config,
         case,
         baseline(config, case, rows.stop)[rows.start :],
         np.full(len(rows), 1.0 / len(rows)),
         store,
-        track_seeds=seeds,
+        track_seeds=None if seeds is None else seeds[rows.start :],
         n_threads=n_threads,
     )
     return result.assign_coords(sample=np.array(rows))

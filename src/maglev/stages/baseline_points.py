@@ -9,7 +9,7 @@ from maglev.parameters import Config
 from maglev.stage import Stage
 from maglev.stages import points
 from maglev.stages.points import baseline, marginals, n_samples
-from maglev.stages.reads import N_SAMPLES, RANDOM_GAINS
+from maglev.stages.reads import N_SAMPLES, RANDOM_QUANTITIES
 from maglev.uncertainty.pointset import PointSet, gf_discrepancy
 from maglev.vocabulary import BASELINE
 
@@ -52,7 +52,7 @@ def dataset(config: Config, case: str) -> xr.Dataset:
 STAGE = Stage(
     name="baseline_points",
     of="case",
-    reads=(*RANDOM_GAINS, *N_SAMPLES),
+    reads=(*RANDOM_QUANTITIES, *N_SAMPLES),
     takes={"case": str},
     methods=(BASELINE,),
     layout="points",

@@ -9,7 +9,7 @@ from maglev.stage import Stage
 from maglev.stages import points
 from maglev.stages.points import gf_set, marginals
 from maglev.stages.randomness import generator
-from maglev.stages.reads import RANDOM_GAINS
+from maglev.stages.reads import RANDOM_QUANTITIES
 from maglev.uncertainty.pointset import sobol_points
 from maglev.vocabulary import ADAPTIVE
 
@@ -46,7 +46,7 @@ def dataset(config: Config, case: str, method: str) -> xr.Dataset:
 STAGE = Stage(
     name="candidate_points",
     of="method",
-    reads=(*RANDOM_GAINS, "study.{method}", "study.n_counting"),
+    reads=(*RANDOM_QUANTITIES, "study.{method}", "study.n_counting"),
     takes={"case": str, "method": str},
     methods=ADAPTIVE,
     layout="points",

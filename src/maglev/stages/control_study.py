@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,10 +10,10 @@ import xarray as xr
 
 from maglev.parameters import Circuit, Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import coordinates, extremes, lost
+from maglev.stages.extremes import coordinates, extremes, lost, responses_of
 from maglev.stages.tables import markdown, number, of_track
 from maglev.uncertainty.samples import deviation_interval
-from maglev.vocabulary import BASELINE, GROUPS, RESPONSE_UNITS, RESPONSES
+from maglev.vocabulary import BASELINE, GROUPS, RESPONSE_UNITS, Response
 
 KINDS = ("suspension", "guidance")
 _ENDS = ("", "_low", "_high")
@@ -47,7 +47,7 @@ def dataset(
     limits
         Layout ``limits``, by case and method.
     baseline
-        Layout ``runs``, by case: where deviations are counted.
+        Layout ``runs``, by case: deviations are those of these runs.
 
     Returns
     -------
@@ -56,6 +56,7 @@ def dataset(
         methods without a baseline of their own, or where fewer than eight runs held.
     """
     pairs = list(limits)
+    responses = responses_of(limits[pairs[0]])
     columns: dict[str, list[Any]] = {}
     for case, method in pairs:
         one = limits[case, method]
@@ -67,7 +68,7 @@ def dataset(
         for name in (*_OF_LIMITS, *_LOST, "n_runs"):
             row[f"curve_{name}"] = one[name].to_numpy()
         runs = baseline.get(case) if method == BASELINE else None
-        moments = _moments(runs, config.study.confidence)
+        moments = _moments(runs, responses, config.study.confidence)
         row["curve_mean"] = moments[0]
         for end, values in zip(_ENDS, moments[1:], strict=True):
             row[f"curve_deviation{end}"] = values
@@ -82,6 +83,7 @@ def dataset(
     result = xr.Dataset(
         variables,
         coords=coordinates(
+            responses,
             curve=curve,
             failure_probability=limits[pairs[0]]["failure_probability"].to_numpy(),
         ),
@@ -93,11 +95,13 @@ def dataset(
     return result
 
 
-def _moments(runs: xr.Dataset | None, confidence: float) -> np.ndarray:
+def _moments(
+    runs: xr.Dataset | None, responses: Sequence[Response], confidence: float
+) -> np.ndarray:
     """Mean, standard deviation and its interval (moment, response) of the held runs."""
-    values = extremes(runs)[~lost(runs)] if runs is not None else np.empty((0, len(RESPONSES)))
-    if values.shape[0] < 8:
-        return np.full((4, len(RESPONSES)), np.nan)
+    if runs is None or np.count_nonzero(~lost(runs)) < 8:
+        return np.full((4, len(responses)), np.nan)
+    values = extremes(runs, responses)[~lost(runs)]
     ends = [deviation_interval(column, confidence) for column in values.T]
     return np.vstack([values.mean(axis=0), np.array(ends).T])
 
@@ -126,7 +130,7 @@ def rows(found: xr.Dataset) -> list[dict[str, object]]:
             "n_runs": int(one["curve_n_runs"]),
             **{name: float(one[f"curve_{name}"]) for name in _LOST},
         }
-        for r, response in enumerate(RESPONSES):
+        for r, response in enumerate(responses_of(found)):
             at = one.isel(response=r)
             for p, level in enumerate(found["failure_probability"].to_numpy()):
                 made.append(
@@ -187,7 +191,7 @@ def text(found: xr.Dataset) -> str:
                 for k in counted
             ),
         ]
-        for r, response in enumerate(RESPONSES)
+        for r, response in enumerate(responses_of(found))
     ]
     limits = [
         [
@@ -198,7 +202,7 @@ def text(found: xr.Dataset) -> str:
                 for one in curves
             ),
         ]
-        for r, response in enumerate(RESPONSES)
+        for r, response in enumerate(responses_of(found))
         for p, level in enumerate(found["failure_probability"].to_numpy())
     ]
     heads = [f"{case}, {method}" for case, method in pairs]

@@ -1,8 +1,9 @@
-"""Density and exceedance of the six extremes: of a surrogate, or of the baseline itself."""
+"""Density and exceedance of the extremes: of a surrogate, or of the baseline itself."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -11,8 +12,8 @@ from maglev.arrays import FloatArray
 from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import coordinates, extremes, lost
-from maglev.stages.reads import PREDICTING
+from maglev.stages.extremes import coordinates, extremes, lost, responses_of
+from maglev.stages.reads import PREDICTING, RESPONSES_OF_STUDY
 from maglev.stages.surrogate import loss_comment, stored_predictor
 from maglev.uncertainty.gdee import (
     density_with_strays,
@@ -22,12 +23,12 @@ from maglev.uncertainty.gdee import (
 )
 from maglev.uncertainty.reliability import binomial_interval, error_range_near, exceedance
 from maglev.uncertainty.samples import held_part
-from maglev.vocabulary import BASELINE, DENSITY_METHODS, DESIGNED, RESPONSES
+from maglev.vocabulary import BASELINE, DENSITY_METHODS, DESIGNED, Response
 
 _LOG = logging.getLogger(__name__)
 
 N_BODY, N_TAIL = 801, 200
-"""Places at which a density is given: evenly over its body, and ever wider apart in its tail."""
+"""Values at which a density is given: evenly over its body, and ever wider apart in its tail."""
 
 REACH = 4.0
 """Bandwidths beyond the smallest and the largest value at which a density is still given; a
@@ -84,10 +85,11 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
     UserError
         If no run held.
     """
-    values, away = extremes(runs), lost(runs)
+    responses = config.responses_of_study
+    values, away = extremes(runs, responses), lost(runs)
     n = away.size
     columns = []
-    for response in range(len(RESPONSES)):
+    for response in range(len(responses)):
         held = held_part(values[:, response], away)
         column = _column(held.values, held.probability, held.lost_probability)
         n_beyond = np.round(column["exceedance"] * n)
@@ -106,7 +108,7 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
             | {"exceedance_low": low, "exceedance_high": high}
             | {"density_direct_low": band[0], "density_direct_high": band[1]}
         )
-    result = _put_together(columns, float(away.mean()), n)
+    result = _put_together(responses, columns, float(away.mean()), n)
     result["exceedance"].attrs["comment"] = "interval: exact binomial, at each value by itself"
     return result
 
@@ -118,8 +120,8 @@ def of_surrogate(
 
     Points that are more likely lost than held are left out, the others keep their proportions;
     the probability of loss is that of the surrogate's file.  Exceedance is the exact weighted one.
-    Its interval moves the predictions by the range of leave-one-out residuals near each value and
-    the lost probability to the ends of its own interval, where runs were lost.
+    Its interval shifts the predictions by the range of leave-one-out residuals near each value,
+    and, where runs were lost, the lost probability to the ends of its own interval.
 
     Parameters
     ----------
@@ -135,8 +137,8 @@ def of_surrogate(
     Returns
     -------
     dataset
-        Layout ``density``; ``density_method`` says where strays made the GDEE go by the logarithm
-        or refuse; a density that it refused is the direct one.
+        Layout ``density``; ``density_method`` says where strays required the GDEE of the logarithm,
+        or the direct density instead of any GDEE.
 
     Raises
     ------
@@ -154,7 +156,7 @@ def of_surrogate(
     loss = found.loss
     least, most = (loss.lower, loss.upper) if loss.region is not None else (0.0, 0.0)
     columns = []
-    for response, name in enumerate(RESPONSES):
+    for response, name in enumerate(responses_of(eev)):
         held = held_part(predicted[:, response], likely_lost, probability)
         sample = (held.values, held.probability)
         column = _column(*sample, loss.probability)
@@ -189,7 +191,7 @@ def of_surrogate(
                 )[::-1],
             }
         )
-    result = _put_together(columns, loss.probability, design.sizes["sample"])
+    result = _put_together(responses_of(eev), columns, loss.probability, design.sizes["sample"])
     result["lost_probability"].attrs["comment"] = loss_comment(loss)
     result["exceedance"].attrs["comment"] = (
         "exact weighted distribution of the representative points; interval: leave-one-out "
@@ -198,8 +200,8 @@ def of_surrogate(
     return result
 
 
-def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> FloatArray:
-    """Places (place,) of a density: dense around its body, sparse towards strays.
+def grid(values: FloatArray, probability: FloatArray, bandwidth: float) -> FloatArray:
+    """Values (cell,) at which a density is given: dense around its body, sparse towards strays.
 
     Parameters
     ----------
@@ -218,7 +220,7 @@ def places(values: FloatArray, probability: FloatArray, bandwidth: float) -> Flo
 def _column(values: FloatArray, probability: FloatArray, lost_probability: float) -> dict:
     """Variables of one response with a direct density."""
     bandwidth = silverman_bandwidth(values, probability)
-    at = places(values, probability, bandwidth)
+    at = grid(values, probability, bandwidth)
     sample = (at, values, probability)
     direct = direct_density(*sample, bandwidth=bandwidth, lost_probability=lost_probability)
     mean = probability @ values
@@ -239,7 +241,9 @@ def _column(values: FloatArray, probability: FloatArray, lost_probability: float
     }
 
 
-def _put_together(columns: list[dict], lost_probability: float, n_runs: int) -> xr.Dataset:
+def _put_together(
+    responses: Sequence[Response], columns: list[dict], lost_probability: float, n_runs: int
+) -> xr.Dataset:
     """Dataset of the file from the variables of each response."""
     variables = {}
     for name in columns[0]:
@@ -248,7 +252,7 @@ def _put_together(columns: list[dict], lost_probability: float, n_runs: int) -> 
     n_cells = variables["value"][1].shape[1]
     result = xr.Dataset(
         {**variables, "lost_probability": ((), lost_probability), "n_runs": ((), n_runs)},
-        coords=coordinates(cell=np.arange(n_cells)),
+        coords=coordinates(responses, cell=np.arange(n_cells)),
     )
     for name in ("density", "density_direct"):
         result[name].attrs["comment"] = COMMENT
@@ -258,7 +262,7 @@ def _put_together(columns: list[dict], lost_probability: float, n_runs: int) -> 
 STAGE = Stage(
     name="density",
     of="method",
-    reads=PREDICTING,
+    reads=(*PREDICTING, *RESPONSES_OF_STUDY),
     inputs={
         "baseline": Input("runs", methods=(BASELINE,)),
         "design": Input("design", methods=DESIGNED),

@@ -1,9 +1,9 @@
 """Designs: training runs of a surrogate, in one stage or in adaptive rounds.
 
 An adaptive design is a fold over its rounds.  Each round is written to the store as a small file of
-its own before the next begins; to resume is to read them once more.  When to stop is decided from
-this history alone, so another threshold or another largest number of runs continues or shortens
-what is stored, without a run of the model.
+its own before the next begins; to resume is to read them once more.  This history alone decides
+when to stop, so another threshold or another largest number of runs continues or shortens the
+stored design, without a run of the model.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -24,9 +24,9 @@ from maglev import datasets
 from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.fingerprint import code_of
-from maglev.parameters import Config
+from maglev.parameters import WHY_NO_DESIGN, Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import extremes, lost
+from maglev.stages.extremes import extremes, lost, responses_of
 from maglev.stages.points import case_of, marginals
 from maglev.stages.randomness import generator
 from maglev.stages.reads import RUNS_OF_CASE
@@ -38,7 +38,7 @@ from maglev.uncertainty.learning import predicted_limits, tail_batch, taylor_bat
 from maglev.uncertainty.pointset import sobol_points
 from maglev.uncertainty.selection import fit_selected
 from maglev.uncertainty.surrogate import Fit, Surrogate
-from maglev.vocabulary import ADAPTIVE, DECISIONS, DESIGNED, RESPONSES
+from maglev.vocabulary import ADAPTIVE, DECISIONS, DESIGNED, Response
 
 _LOG = logging.getLogger(__name__)
 
@@ -73,9 +73,9 @@ def dataset(
     initial_points
         Layout ``points``: the first design.
     candidate_points
-        Layout ``points``: what the rounds of an adaptive method choose from.
+        Layout ``points``: candidates of the rounds of an adaptive method.
     baseline
-        Layout ``runs``: what the surrogate of each round is compared with.
+        Layout ``runs``: the surrogate of each round is compared with it.
     store
         Folder of the store of runs and rounds.
     n_threads
@@ -121,10 +121,14 @@ class _Design:
         missing = {"initial", *(["candidates"] if method in ADAPTIVE else [])} - set(points)
         if missing:
             raise UserError(f"the method '{method}' needs the points {', '.join(sorted(missing))}")
+        if case_of(config, case).track != "fixed":
+            raise UserError(f"cases.{case}: {method} needs track: fixed: {WHY_NO_DESIGN}")
         self.config, self.case, self.method = config, case, method
         self.points, self.store, self.n_threads = points, Path(store), n_threads
         self.settings = getattr(config.study, method)
         self.levels = config.study.failure_probability
+        driving = [self.settings.response] if method == "asm_paper" else []
+        self.responses = tuple(dict.fromkeys([*config.responses_of_designs, *driving]))
         self.inputs = marginals(config, case)
         for name, one in points.items():
             if one.sizes["parameter"] != self.inputs.n:
@@ -134,7 +138,7 @@ class _Design:
                 )
         population = sobol_points(self.inputs, N_LIMITS, generator(config.seed, "limits"))
         self.population = population.standard
-        self.truth = _held(baseline) if baseline is not None else None
+        self.truth = _held(baseline, self.responses) if baseline is not None else None
         self.truth_hash = "none" if self.truth is None else _hash(*self.truth)
         self.fit: Fit = (
             fit_kriging  # the tail criterion needs a covariance
@@ -148,24 +152,26 @@ class _Design:
 
     def _content(self) -> dict[str, object]:
         """All settings that decide the rounds, without stopping rule and final surrogate."""
-        chosen = case_of(self.config, self.case)
+        chosen = case_of(self.config, self.case).quantities()
         quantities = self.settings.quantities()
-        later = {"threshold", "n_rounds", "n_largest", "n_runs"}
+        later = {"threshold", "n_rounds", "n_largest", "n_runs", "responses"}
         if self.method == "asm":
             later |= {"surrogate"}
         return {
             **content(self.config.of_case(self.case)),
             "gains": self.config.gains.quantities(),
-            "coefficient_of_variation": chosen.coefficient_of_variation,
-            "random_gains": list(chosen.random_gains),
+            "random": list(chosen["random"].items()),
+            "correlation": chosen["correlation"],
+            "track": chosen["track"],
             "failure_probability": list(self.levels),
+            "responses": list(self.responses),
             self.method: {k: v for k, v in quantities.items() if k not in later},
             "points": {name: _hash(one["standard"].values) for name, one in self.points.items()},
         }
 
     def finished(self) -> xr.Dataset:
         """All rounds, from the store or computed, until the stopping rule holds."""
-        state = AdaptiveState.empty(self.inputs.n, len(RESPONSES))
+        state = AdaptiveState.empty(self.inputs.n, len(self.responses))
         surrogate: Surrogate | None = None
         rounds: list[xr.Dataset] = []
         changes: list[float] = []
@@ -231,11 +237,12 @@ class _Design:
             self.config, self.case, standard, probability, self.store, n_threads=self.n_threads
         )
         n, start = standard.shape[0], state.lost.size
-        unknown = np.full((n, len(RESPONSES)), np.nan)
+        unknown = np.full((n, len(self.responses)), np.nan)
         result["predicted"] = (
             ("sample", "response"),
             unknown if predicted is None else predicted,
         )
+        result = result.assign_coords(response=list(self.responses))
         state = _absorbed(state, result)
         after = self.fit(*state.training)
         limits = self._limits(number, state, after)
@@ -254,7 +261,6 @@ class _Design:
             decision=(("round",), [np.int8(self._decision(state, [*changes, change]))]),
         ).assign_coords(
             sample=np.arange(start, start + n),
-            response=np.arange(len(RESPONSES), dtype=np.int8),
             failure_probability=np.array(self.levels),
             round=np.array([number], dtype=np.int32),
         )
@@ -304,7 +310,7 @@ class _Design:
     @property
     def _driving(self) -> int:
         """Number of the response that drives the published method."""
-        return RESPONSES.index(self.settings.response)
+        return self.responses.index(self.settings.response)
 
     def _limits(self, number: int, state: AdaptiveState, surrogate: Surrogate) -> FloatArray:
         """Limits (response, level) by a surrogate, on the same points in all rounds."""
@@ -318,7 +324,7 @@ class _Design:
     def _rmse(self, surrogate: Surrogate) -> FloatArray:
         """Root mean square error (1, response) against the baseline; NaN without one."""
         if self.truth is None:
-            return np.full((1, len(RESPONSES)), np.nan)
+            return np.full((1, len(self.responses)), np.nan)
         standard, values = self.truth
         return np.sqrt(np.mean((surrogate.predict(standard) - values) ** 2, axis=0))[None]
 
@@ -368,14 +374,14 @@ def _absorbed(state: AdaptiveState, one: xr.Dataset) -> AdaptiveState:
     """The state after one more round."""
     away = lost(one)
     predicted = one["predicted"].values if state.tested.size else None
-    values = np.where(away[:, None], np.nan, extremes(one))
+    values = np.where(away[:, None], np.nan, extremes(one, responses_of(one)))
     return absorb(state, one["standard"].values, values, away, predicted)
 
 
-def _held(baseline: xr.Dataset) -> tuple[FloatArray, FloatArray]:
+def _held(baseline: xr.Dataset, responses: Sequence[Response]) -> tuple[FloatArray, FloatArray]:
     """Points (sample, parameter) and extremes (sample, response) of a baseline that held."""
     held = ~lost(baseline)
-    return baseline["standard"].values[held], extremes(baseline)[held]
+    return baseline["standard"].values[held], extremes(baseline, responses)[held]
 
 
 def _hash(*arrays: FloatArray) -> str:
@@ -396,7 +402,12 @@ def _largest_change(before: FloatArray, after: FloatArray, scale: FloatArray) ->
 STAGE = Stage(
     name="design",
     of="method",
-    reads=(*RUNS_OF_CASE, "study.failure_probability", "study.{method}"),
+    reads=(
+        *RUNS_OF_CASE,
+        "study.failure_probability",
+        "study.asm.responses",
+        "study.{method}",
+    ),
     inputs={
         "initial_points": Input("points"),
         "candidate_points": Input("points", methods=ADAPTIVE),

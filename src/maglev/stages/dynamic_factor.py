@@ -1,7 +1,7 @@
 """Dynamic coefficient of the midspan deflection over a range of speeds.
 
-Every passage is kept in the store of runs as soon as it is computed: a sweep that was stopped goes
-on where it was.
+Every passage is kept in the store of runs as soon as it is computed, so an interrupted sweep
+continues where it stopped.
 """
 
 from __future__ import annotations

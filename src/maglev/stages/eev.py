@@ -6,7 +6,7 @@ import xarray as xr
 
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import coordinates
+from maglev.stages.extremes import coordinates, responses_of
 from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import stored_predictor
 from maglev.vocabulary import DESIGNED, GAINS
@@ -18,7 +18,7 @@ def dataset(
     surrogate: xr.Dataset,
     representative_points: xr.Dataset,
 ) -> xr.Dataset:
-    """Predict the six extremes at the representative points.
+    """Predict the extremes at the representative points.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``eev``.  Extremes are predicted at every point, also where it is likely lost: there
-        they mean nothing, see ``lost_probability_at``.
+        Layout ``eev``.  Extremes are predicted at every point; where it is likely lost
+        (``lost_probability_at``), they mean nothing.
     """
     found = stored_predictor(config, design, surrogate)
     points = representative_points
@@ -48,7 +48,9 @@ def dataset(
             "deviation": (of_response, found.surrogate.standard_deviation(at)),
             "lost_probability_at": ("sample", found.loss.lost_probability(at)),
         },
-        coords=coordinates(sample=points["sample"], parameter=points["parameter"]),
+        coords=coordinates(
+            responses_of(surrogate), sample=points["sample"], parameter=points["parameter"]
+        ),
     )
 
 

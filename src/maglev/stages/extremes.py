@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
@@ -11,7 +13,7 @@ from maglev.arrays import BoolArray, FloatArray
 from maglev.stages.randomness import generator_of_statistics
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import sobol_points
-from maglev.vocabulary import METHODS, RESPONSES
+from maglev.vocabulary import Response
 
 
 def lost(runs: xr.Dataset) -> BoolArray:
@@ -19,9 +21,14 @@ def lost(runs: xr.Dataset) -> BoolArray:
     return runs["status"].to_numpy() != 0
 
 
-def extremes(runs: xr.Dataset) -> FloatArray:
-    """Extremes (sample, response) of a set of runs [m, m s-2], NaN where levitation was lost."""
-    return np.column_stack([runs[name].to_numpy() for name in RESPONSES])
+def extremes(runs: xr.Dataset, responses: Sequence[Response]) -> FloatArray:
+    """Extremes (sample, response) of a set of runs [their units], NaN where levitation was lost."""
+    return np.column_stack([runs[name].to_numpy() for name in responses])
+
+
+def responses_of(found: xr.Dataset) -> tuple[Response, ...]:
+    """Responses of a file along its ``response``."""
+    return tuple(found["response"].to_numpy().tolist())
 
 
 def population(seed: int, n: int, n_parameters: int) -> FloatArray:
@@ -42,11 +49,6 @@ def population(seed: int, n: int, n_parameters: int) -> FloatArray:
     return sobol_points(marginals, n, generator_of_statistics(seed, "population")).standard
 
 
-def coordinates(**along: npt.ArrayLike) -> dict[str, npt.ArrayLike]:
-    """Coordinates of a file: the six responses, and others by name."""
-    return {"response": np.arange(len(RESPONSES), dtype=np.int8), **along}
-
-
-def method_number(name: str) -> np.int8:
-    """The code of a method in a file."""
-    return np.int8(METHODS.index(name))
+def coordinates(responses: Sequence[Response], **along: npt.ArrayLike) -> dict[str, npt.ArrayLike]:
+    """Coordinates of a file: its responses, and others by name."""
+    return {"response": list(responses), **along}

@@ -7,8 +7,8 @@ import xarray as xr
 from maglev.parameters import Config
 from maglev.stage import Stage
 from maglev.stages import points
-from maglev.stages.points import case_of, gf_set, random_columns
-from maglev.stages.reads import RANDOM_GAINS
+from maglev.stages.points import gf_set, parameters
+from maglev.stages.reads import RANDOM_QUANTITIES
 from maglev.vocabulary import DESIGNED
 
 
@@ -38,7 +38,7 @@ def dataset(config: Config, case: str, method: str) -> xr.Dataset:
     if method == "osm":
         found = gf_set(config, case, design.n_runs, method)
     else:
-        n_random = random_columns(case_of(config, case)).size
+        n_random = len(parameters(config, case))
         n = min(design.n_initial, design.initial_per_gain * n_random)
         found = gf_set(config, case, n, f"initial_{method}")
     return points.dataset(config, case, found)
@@ -47,7 +47,7 @@ def dataset(config: Config, case: str, method: str) -> xr.Dataset:
 STAGE = Stage(
     name="initial_points",
     of="method",
-    reads=(*RANDOM_GAINS, "study.{method}", "study.n_counting"),
+    reads=(*RANDOM_QUANTITIES, "study.{method}", "study.n_counting"),
     takes={"case": str, "method": str},
     methods=DESIGNED,
     layout="points",

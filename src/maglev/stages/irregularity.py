@@ -24,7 +24,7 @@ _SEGMENT_LENGTH = 2  # length of Welch's segments, in longest wavelengths
 
 
 def _sampled(config: Config, end: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places [m] and displacements (profile, x) [m] from the start of the fade-in to the end."""
+    """Positions [m] and displacements (profile, x) [m] from the start of the fade-in to the end."""
     irregularity = config.irregularity
     name = irregularity.profile_file if irregularity.enabled else None
     measured = profiles.read(name) if name else None
@@ -50,7 +50,7 @@ def dataset(config: Config) -> xr.Dataset:
     """Irregularity of both rails along the guideway, and spectra of both directions.
 
     The spectra of a drawn profile are estimated from a longer stretch of the same profile, those
-    of a measured one from the stretch that the train meets; both from the first pier on.
+    of a measured one from the part that the train meets; both from the first pier on.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def dataset(config: Config) -> xr.Dataset:
     Raises
     ------
     UserError
-        If a measured profile cannot be read or is shorter than the run.
+        If a measured profile cannot be read or does not cover the passage.
     """
     irregularity = config.irregularity
     end = config.guideway.length + config.train.length

@@ -1,8 +1,9 @@
-"""Limits of the six extremes at the failure probabilities, with intervals and status."""
+"""Limits of the extremes at the failure probabilities, with intervals and status."""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,8 +14,8 @@ from maglev.arrays import FloatArray
 from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import coordinates, extremes, lost, population
-from maglev.stages.reads import PREDICTING
+from maglev.stages.extremes import coordinates, extremes, lost, population, responses_of
+from maglev.stages.reads import PREDICTING, RESPONSES_OF_STUDY
 from maglev.stages.surrogate import loss_comment, stored_predictor
 from maglev.uncertainty.reliability import (
     Limits,
@@ -23,7 +24,7 @@ from maglev.uncertainty.reliability import (
     sample_limits,
     surrogate_limits,
 )
-from maglev.vocabulary import BASELINE, DESIGNED, GIVEN, INFINITE, LIMIT_STATUS, RESPONSES
+from maglev.vocabulary import BASELINE, DESIGNED, GIVEN, INFINITE, LIMIT_STATUS, Response
 
 _LOG = logging.getLogger(__name__)
 
@@ -70,11 +71,13 @@ def of_baseline(config: Config, runs: xr.Dataset) -> xr.Dataset:
     dataset
         Layout ``limits``.
     """
-    values, away = extremes(runs), lost(runs)
+    responses = config.responses_of_study
+    values, away = extremes(runs, responses), lost(runs)
     n_lost = int(np.count_nonzero(away))
     low, high = binomial_interval(n_lost, away.size, config.study.confidence)
     result = _put_together(
         config,
+        responses,
         baseline_limits(config, values, away),
         baseline_limits(config, values[~away], away[~away]),
         lost_probability=(n_lost / away.size, float(low), float(high)),
@@ -94,9 +97,9 @@ def baseline_limits(config: Config, values: FloatArray, away: np.ndarray) -> lis
     config
         The configuration: levels and confidence.
     values : (sample, response)
-        Extremes [their unit], anything where ``away``.
+        Extremes [their unit]; any value where ``away``.
     away : (sample,) of bool
-        Which samples were lost.
+        Whether each sample was lost.
     """
     return [
         sample_limits(
@@ -114,7 +117,7 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
 
     The population is a scrambled Sobol' set taken for independent draws, which makes the sampling
     part of the interval too wide rather than too narrow.  Where no run was lost, the probability
-    of loss enters the limits as zero; what is not known about it stands in its own interval.
+    of loss enters the limits as zero; its own interval states its uncertainty.
 
     Parameters
     ----------
@@ -160,12 +163,13 @@ def of_surrogate(config: Config, design: xr.Dataset, surrogate: xr.Dataset) -> x
             limits_off(
                 config, predictions[:, response], training[:, response], residuals[:, response], of
             )
-            for response in range(len(RESPONSES))
+            for response in range(training.shape[1])
         ]
         for of in (losing, {})
     )
     result = _put_together(
         config,
+        responses_of(surrogate),
         limits,
         held_limits,
         lost_probability=(loss.probability, loss.lower, loss.upper),
@@ -225,6 +229,7 @@ def status_numbers(limits: Limits) -> list[int]:
 
 def _put_together(
     config: Config,
+    responses: Sequence[Response],
     limits: list[Limits],
     held_limits: list[Limits],
     *,
@@ -243,7 +248,7 @@ def _put_together(
                 values = np.where(infinite, np.inf, values)
             columns[f"{name}{suffix}"] = (level, values)
         columns[f"{name}_status"] = (level, status)
-    for response, name in enumerate(RESPONSES):
+    for response, name in enumerate(responses):
         said = [
             f"{p:g}: {value:.4g}" if LIMIT_STATUS[code] == GIVEN else f"{p:g}: {LIMIT_STATUS[code]}"
             for p, value, code in zip(
@@ -263,14 +268,14 @@ def _put_together(
             "n_runs": ((), n_runs),
             "sigma": ("response", sigma),
         },
-        coords=coordinates(failure_probability=list(config.study.failure_probability)),
+        coords=coordinates(responses, failure_probability=list(config.study.failure_probability)),
     )
 
 
 STAGE = Stage(
     name="limits",
     of="method",
-    reads=(*PREDICTING, "study.failure_probability"),
+    reads=(*PREDICTING, *RESPONSES_OF_STUDY, "study.failure_probability"),
     inputs={
         "baseline": Input("runs", methods=(BASELINE,)),
         "design": Input("design", methods=DESIGNED),

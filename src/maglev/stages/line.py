@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 from maglev.arrays import FloatArray
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import coordinates, population
+from maglev.stages.extremes import coordinates, population, responses_of
 from maglev.stages.limits import limits_off, status_numbers
 from maglev.stages.reads import PREDICTING
 from maglev.stages.surrogate import predictor
@@ -19,31 +19,31 @@ from maglev.stages.tables import markdown, number
 from maglev.uncertainty.gdee import direct_density, silverman_bandwidth
 from maglev.uncertainty.reliability import Limits, clustered_limits
 from maglev.uncertainty.shares import crossed_shares, first_order
-from maglev.vocabulary import GAIN_KEYS, GIVEN, LIMIT_STATUS, RESPONSE_UNITS, RESPONSES
+from maglev.vocabulary import GIVEN, LIMIT_STATUS, RESPONSE_UNITS
 
 _LOG = logging.getLogger(__name__)
 
 N_POINTS = 2**15
-"""Points at which the surrogate of each track is read; assumed: 33 of them lie beyond a limit at
-1e-3, and the intervals count their sampling."""
+"""Points at which the surrogate of each track is evaluated; assumed: 33 of them lie beyond a limit
+at 1e-3, and the intervals include their sampling."""
 
 N_CELLS = 1001
-"""Places at which densities are given; assumed: a few in the kernel of the narrowest track."""
+"""Values at which densities are given [-]; assumed: a few per kernel of the narrowest track."""
 
 REACH = 4.0
-"""Bandwidths of the widest track beyond the smallest and the largest value."""
+"""Margin beyond the smallest and the largest value, in bandwidths of the widest track."""
 
 NARROW = 0.4
-"""Share of the gains' variation at which limits are read again: 0.04 where they vary by 0.10, as at
-the two ends of the paper's range up to there.  Within the runs' range, so nothing is extrapolated.
+"""Share of the gains' variation of a second set of limits: 0.04 where gains vary by 0.10, the ends
+of the paper's range.  It lies within the range of the runs, so nothing is extrapolated.
 """
 
 
 def dataset(config: Config, tracks: xr.Dataset) -> xr.Dataset:
     """Shares of the variance, densities and limits of the line and of each track.
 
-    Points of the gains at which levitation is lost on any track are left out: all but the lost
-    shares is given that it holds.
+    Points of the gains at which levitation is lost on any track are left out: all results but the
+    lost shares hold given that levitation holds.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def dataset(config: Config, tracks: xr.Dataset) -> xr.Dataset:
     values = tracks["extreme"].to_numpy()[:, kept]
     n_tracks = values.shape[0]
     columns: dict[str, list[FloatArray]] = {}
-    for response, name in enumerate(RESPONSES):
+    for response, name in enumerate(responses_of(tracks)):
         at, of_track = _densities(values[:, :, response])
         share = crossed_shares(values[:, :, response], config.study.confidence)
         for key, one in (
@@ -108,6 +108,7 @@ def dataset(config: Config, tracks: xr.Dataset) -> xr.Dataset:
             "n_runs": ((), away.size),
         },
         coords=coordinates(
+            responses_of(tracks),
             track=np.arange(n_tracks),
             cell=np.arange(N_CELLS),
             parameter=tracks["parameter"].to_numpy(),
@@ -139,7 +140,7 @@ _DIMS = {
 
 
 def _densities(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Places (cell,) and the density (track, cell) on each track, of values (track, sample)."""
+    """Values (cell,) and the density (track, cell) on each track, of values (track, sample)."""
     width = [silverman_bandwidth(one) for one in values]
     reach = REACH * max(width)
     at = np.linspace(values.min() - reach, values.max() + reach, N_CELLS)
@@ -151,14 +152,16 @@ def _densities(values: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _by_track(config: Config, tracks: xr.Dataset) -> dict[str, tuple[tuple[str, ...], FloatArray]]:
     """Limits and first-order indices of each track by its surrogate, and limits of the line."""
     points = population(config.seed, N_POINTS, tracks.sizes["parameter"])
-    n_tracks, n_responses = tracks.sizes["track"], len(RESPONSES)
+    n_tracks, n_responses = tracks.sizes["track"], tracks.sizes["response"]
     predictions = np.empty((n_tracks, N_POINTS, n_responses))
     held = np.ones(N_POINTS, dtype=bool)
     limits: list[list[Limits]] = []
     narrow, first = [], []
     with threadpool_limits(1, "blas"):  # more threads would sum in another order
         for number in range(n_tracks):
-            found = predictor(config, _of_track(tracks, number), config.study.tracks.surrogate)
+            of_track = _of_track(tracks, number)
+            choice = config.study.tracks.surrogate
+            found = predictor(config, of_track, choice, responses_of(tracks))
             surrogate = found.surrogate
             residuals, training = surrogate.leave_one_out(), surrogate.values
             predictions[number] = surrogate.predict(points)
@@ -213,7 +216,7 @@ def _of_track(tracks: xr.Dataset, number: int) -> xr.Dataset:
             "status": ("sample", one["status_on_track"].to_numpy()),
             **{
                 name: ("sample", one["extreme"].isel(response=r).to_numpy())
-                for r, name in enumerate(RESPONSES)
+                for r, name in enumerate(responses_of(tracks))
             },
         }
     )
@@ -221,9 +224,9 @@ def _of_track(tracks: xr.Dataset, number: int) -> xr.Dataset:
 
 def rows(found: xr.Dataset) -> list[dict[str, object]]:
     """The table as rows of a CSV file: one per response and failure probability."""
-    gains = [GAIN_KEYS[k] for k in found["parameter"].to_numpy()]
+    gains = [one.removeprefix("gains.") for one in found["parameter"].to_numpy().tolist()]
     made: list[dict[str, object]] = []
-    for r, response in enumerate(RESPONSES):
+    for r, response in enumerate(responses_of(found)):
         at = found.isel(response=r)
         leading = at["first_order_on_track"].to_numpy().argmax(axis=1)
         most = int(np.bincount(leading, minlength=len(gains)).argmax())

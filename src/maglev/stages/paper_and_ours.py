@@ -12,10 +12,10 @@ from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import lost
 from maglev.stages.tables import markdown, number, of_track
-from maglev.vocabulary import DECISIONS, METHODS, RESPONSES, SOURCES
+from maglev.vocabulary import DECISIONS, METHODS, SOURCES
 
 RESPONSE = "girder_displacement_z"
-"""The response that the paper's surviving numbers speak of."""
+"""Response of the paper's numbers."""
 
 PAPER_PEAK = {"mcm": 6.37e4, "osm": 6.01e4, "asm_paper": 6.44e4}
 """Largest densities in the paper's Fig. 11 [1/m]."""
@@ -27,7 +27,7 @@ PAPER_RMSE = {"osm": 1.34e-5, "asm_paper": 1e-6}
 """Root mean square errors at 273 runs in the paper's Fig. 9 [m]; that of ASM is an upper bound."""
 
 PAPER_RMSE_N_RUNS = 273
-"""Number of runs behind ``PAPER_RMSE``."""
+"""Number of runs of ``PAPER_RMSE``."""
 
 PAPER_N_RUNS = {"mcm": 10_000, "osm": 363, "asm_paper": 363}
 """Runs of the model for the displacement in the paper."""
@@ -60,8 +60,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``paper_and_ours``; the attribute ``why_different`` of each variable says what the
-        numbers of these files say about the difference.  NaN or 0 where there is no number.
+        Layout ``paper_and_ours``; the attribute ``why_different`` of each variable explains the
+        difference by the numbers of these files.  NaN or 0 where there is no number.
 
     Raises
     ------
@@ -71,11 +71,14 @@ def dataset(
     if "mcm" not in density:
         raise UserError("the paper's numbers are compared with a baseline, got no 'mcm' density")
     names = list(METHODS)
-    at = RESPONSES.index(RESPONSE)
-    own = {name: one.isel(response=at) for name, one in density.items()}
+    if RESPONSE not in density["mcm"]["response"]:
+        raise UserError(
+            f"the paper's numbers are of {RESPONSE}, which study.responses does not name"
+        )
+    own = {name: one.sel(response=RESPONSE) for name, one in density.items()}
     peaks = {name: _peak(one) for name, one in own.items()}
     errors = {name: peak / peaks["mcm"] - 1.0 for name, peak in peaks.items() if name != "mcm"}
-    rmse, rmse_n_runs = _rmse(accuracy, at)
+    rmse, rmse_n_runs = _rmse(accuracy.sel(response=RESPONSE))
     n_runs = {name: int(one["n_runs"]) for name, one in own.items()}
     deviations = {name: float(one["standard_deviation"]) for name, one in own.items()}
 
@@ -93,10 +96,7 @@ def dataset(
             "paper_n_runs": pair(PAPER_N_RUNS, n_runs, 0),
             "paper_deviation": pair({"mcm": PAPER_DEVIATION}, deviations, np.nan),
         },
-        coords={
-            "source": np.arange(len(SOURCES), dtype=np.int8),
-            "method": np.arange(len(names), dtype=np.int8),
-        },
+        coords={"source": np.arange(len(SOURCES), dtype=np.int8), "method": names},
     )
     sigma = deviations["mcm"]
     reasons = {
@@ -123,8 +123,8 @@ def rows(table: xr.Dataset) -> list[dict[str, object]]:
         column = table[name]
         if name == "paper_rmse_n_runs":
             continue  # stands with the errors
-        for method in table["method"].to_numpy():
-            paper, ours = (float(column[source, method]) for source in range(2))
+        for method in table["method"].to_numpy().tolist():
+            paper, ours = (float(one) for one in column.sel({"method": method}))
             if not any(value == value and value != 0 for value in (paper, ours)):
                 continue
             found.append(
@@ -132,7 +132,7 @@ def rows(table: xr.Dataset) -> list[dict[str, object]]:
                     "track": str(table.attrs.get("track", "")),
                     "quantity": column.attrs["long_name"],
                     "unit": column.attrs["units"],
-                    "method": METHODS[method],
+                    "method": method,
                     "paper": _or_none(paper),
                     "ours": _or_none(ours),
                     "why different": column.attrs["why_different"],
@@ -233,22 +233,22 @@ def _why_n_runs(designs: Mapping[str, xr.Dataset]) -> str:
         ended = DECISIONS[int(design["decision"][-1])].replace("_", " ")
         why = f"ended by: {ended}" if design.sizes["round"] > 1 else "one stage"
         said.append(f"{name} {n} runs, {n_lost} of them lost, {why}")
-    return "one set of runs serves all six responses here, in the paper one response: " + "; ".join(
+    return "one set of runs serves all responses here, in the paper one response: " + "; ".join(
         said
     )
 
 
-def _rmse(accuracy: xr.Dataset, response: int) -> tuple[dict[str, float], dict[str, int]]:
+def _rmse(accuracy: xr.Dataset) -> tuple[dict[str, float], dict[str, int]]:
     """Errors at the step nearest to the paper's number of runs, and the number of that step."""
     errors, numbers = {}, {}
-    for row, code in enumerate(accuracy["method"].to_numpy()):
-        n_runs = accuracy["step_n_runs"].to_numpy()[row]
-        found = accuracy["step_rmse"].to_numpy()[row, :, response]
+    for method in accuracy["method"].to_numpy().tolist():
+        n_runs = accuracy["step_n_runs"].sel({"method": method}).to_numpy()
+        found = accuracy["step_rmse"].sel({"method": method}).to_numpy()
         known = np.flatnonzero((n_runs > 0) & np.isfinite(found))
         if known.size:
             best = known[np.argmin(np.abs(n_runs[known] - PAPER_RMSE_N_RUNS))]
-            errors[METHODS[code]] = float(found[best])
-            numbers[METHODS[code]] = int(n_runs[best])
+            errors[method] = float(found[best])
+            numbers[method] = int(n_runs[best])
     return errors, numbers
 
 

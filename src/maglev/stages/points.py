@@ -1,11 +1,13 @@
-"""Random gains of a case: their columns, their distributions and their points.
+"""Random quantities of a case: their laws, their points and their values.
 
 Every set draws from random numbers of its own, which the seed and the name of the set decide.  The
-names of the cases play no part: with the same random gains, all cases have the same points in
+names of the cases play no part: with as many random quantities, all cases have the same points in
 standard form.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +16,18 @@ from scipy.stats import norm
 
 from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.parameters import Case, Config
+from maglev.laws import Distribution, Normal
+from maglev.parameters import Case, Config, Gains
 from maglev.stages.randomness import generator
+from maglev.uncertainty.dependence import at_normal, nataf
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import PointSet, gf_points
 from maglev.vocabulary import GAINS
+
+GAIN_COLUMNS = tuple(f"gains.{name}" for name in Gains.model_fields)
+"""Dotted keys of the gains in the order of the columns that `maglev.simulate` takes."""
+
+_FOUR_GAINS = GAIN_COLUMNS[: len(GAINS)]
 
 
 def case_of(config: Config, name: str) -> Case:
@@ -34,13 +43,41 @@ def case_of(config: Config, name: str) -> Case:
     return config.cases[name]
 
 
-def random_columns(case: Case) -> IntArray:
-    """Columns (parameter,) of the random gains in an array of all four, in rising order."""
-    return np.flatnonzero([name.removesuffix("_gain") in case.random_gains for name in GAINS])
+def parameters(config: Config, case: str) -> tuple[str, ...]:
+    """Dotted keys of what is random in a case, in their order in files and arrays.
+
+    Examples
+    --------
+    >>> parameters(Config(), "only_suspension_derivative")
+    ('gains.suspension_derivative',)
+    """
+    return tuple(case_of(config, case).random)
+
+
+def named_values(config: Config, case: str, values: FloatArray) -> xr.DataArray:
+    """Random quantities (sample, parameter) of a case with their keys and units, for a file."""
+    keys = parameters(config, case)
+    units = ", ".join(config.unit_of(key) or "1" for key in keys)
+    return xr.DataArray(
+        values,
+        dims=("sample", "parameter"),
+        coords={"parameter": list(keys)},
+        attrs={"units_by_parameter": units},
+    )
+
+
+def laws_of(config: Config, case: str) -> dict[str, Distribution]:
+    """Distribution of every random quantity of a case by its dotted key, in SI."""
+    keys = parameters(config, case)
+    own = config.with_case_set(case)
+    return {key: own.distribution(case, key) for key in keys}
 
 
 def marginals(config: Config, case: str) -> Marginals:
-    """Distributions of the random gains of a case: independent, normal.
+    """Distributions of the coordinates in which the points of a case are drawn.
+
+    Where all quantities are normal and independent these are they themselves; otherwise
+    independent standard normal variates, of which `values_at` makes the quantities.
 
     Parameters
     ----------
@@ -52,20 +89,27 @@ def marginals(config: Config, case: str) -> Marginals:
     Returns
     -------
     marginals
-        One distribution per random gain, in the order of `maglev.vocabulary.GAINS`.
+        One distribution per random quantity, in their order.
 
     Raises
     ------
     UserError
         If there is no such case.
     """
-    chosen = case_of(config, case)
-    mean = np.array(config.with_case_set(case).gains.as_row)[random_columns(chosen)]
-    return Marginals([norm(one, chosen.coefficient_of_variation * one) for one in mean])
+    laws = laws_of(config, case)
+    if _are_coordinates(config, case, laws):
+        return Marginals([norm(law.mean(), law.std()) for law in laws.values()])
+    return Marginals([norm()] * len(laws))
 
 
-def gains_at(config: Config, case: str, standard: npt.ArrayLike) -> FloatArray:
-    """All four gains at standardised points of the random ones.
+def _are_coordinates(config: Config, case: str, laws: Mapping[str, Distribution]) -> bool:
+    """Whether the points of a case are drawn in its quantities: all normal and independent."""
+    independent = not case_of(config, case).correlation
+    return independent and all(isinstance(law, Normal) for law in laws.values())
+
+
+def values_at(config: Config, case: str, standard: npt.ArrayLike) -> FloatArray:
+    """Random quantities of a case at points in standard form.
 
     Parameters
     ----------
@@ -74,18 +118,61 @@ def gains_at(config: Config, case: str, standard: npt.ArrayLike) -> FloatArray:
     case
         Name of the case.
     standard : (sample, parameter)
-        Standardised random gains [-].
+        Independent standard normal variates [-].
+
+    Returns
+    -------
+    values : (sample, parameter)
+        In the SI units of the quantities.
+
+    Raises
+    ------
+    UserError
+        If there is no such case, or its correlations cannot be met.
+    """
+    standard = np.asarray(standard, dtype=np.float64)
+    laws = laws_of(config, case)
+    if _are_coordinates(config, case, laws):
+        return marginals(config, case).from_standard(standard)
+    if case_of(config, case).correlation:
+        matrix = case_of(config, case).correlation_matrix
+        return nataf(list(laws.values()), matrix, list(laws)).physical(standard)
+    columns = zip(laws.values(), standard.T, strict=True)
+    return np.column_stack([at_normal(law, column) for law, column in columns])
+
+
+def gains_at(config: Config, case: str, values: FloatArray) -> FloatArray:
+    """The four gains of samples whose random quantities are given.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    case
+        Name of the case.
+    values : (sample, parameter)
+        From `values_at`.
 
     Returns
     -------
     gains : (sample, 4)
-        Gains [A/m, A s/m, A/m, A s/m]; those that are not random at their means.
+        In the order of `maglev.vocabulary.GAINS`; those that are not random as configured.
     """
-    standard = np.asarray(standard, dtype=np.float64)
-    gains = np.tile(np.array(config.with_case_set(case).gains.as_row), (standard.shape[0], 1))
-    columns = random_columns(case_of(config, case))
-    gains[:, columns] = marginals(config, case).from_standard(standard)
+    of_case = config.with_case_set(case).gains
+    gains = np.tile(np.array(of_case.as_row), (values.shape[0], 1))
+    for column, key in enumerate(parameters(config, case)):
+        if key in _FOUR_GAINS:
+            gains[:, _FOUR_GAINS.index(key)] = values[:, column]
     return gains
+
+
+def others_at(config: Config, case: str, values: FloatArray) -> dict[str, FloatArray]:
+    """Random quantities (sample,) of a case besides the four gains, by their dotted keys [SI]."""
+    return {
+        key: values[:, column]
+        for column, key in enumerate(parameters(config, case))
+        if key not in _FOUR_GAINS
+    }
 
 
 def n_samples(config: Config, case: str) -> int:
@@ -98,13 +185,40 @@ def baseline(config: Config, case: str, n: int, stream: str = "baseline") -> Flo
 
     Sample i does not depend on ``n``.
     """
-    shape = (n, random_columns(case_of(config, case)).size)
+    shape = (n, len(parameters(config, case)))
     return generator(config.seed, stream).standard_normal(shape)
 
 
 def track_seeds(config: Config, n: int, stream: str = "track") -> IntArray:
-    """Seeds (sample,) of the irregularities that the samples meet; seed i does not depend on n."""
+    """Seeds (sample,) of the irregularity of each sample; seed i does not depend on ``n``."""
     return generator(config.seed, stream).integers(0, 2**31, size=n)
+
+
+def seeds_of_tracks(config: Config, case: str, n: int, stream: str = "track") -> IntArray | None:
+    """Seeds (sample,) of the irregularities of the runs of a case; None if all meet one track.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    case
+        Name of the case.
+    n
+        Number of runs; seed i does not depend on it.
+    stream
+        What the random numbers belong to, where each run has a track of its own.
+    """
+    track = case_of(config, case).track
+    if track == "fixed":
+        return None
+    if track == "random":
+        return track_seeds(config, n, stream)
+    return np.resize(seeds_of_line(config, int(track)), n)
+
+
+def seeds_of_line(config: Config, n_tracks: int) -> IntArray:
+    """Seeds (track,) of the tracks of the line, the first that of the configuration."""
+    return np.concatenate([[config.seed], track_seeds(config, n_tracks - 1, "tracks")])
 
 
 def dataset(config: Config, case: str, points: PointSet) -> xr.Dataset:
@@ -117,12 +231,14 @@ def dataset(config: Config, case: str, points: PointSet) -> xr.Dataset:
     case
         Name of the case.
     points
-        In the random gains of the case.
+        Points of the random gains of the case.
     """
-    gains = gains_at(config, case, points.standard)
+    values = values_at(config, case, points.standard)
+    gains = gains_at(config, case, values)
     return xr.Dataset(
         {
             **{gain: (("sample",), gains[:, k]) for k, gain in enumerate(GAINS)},
+            "parameter_value": named_values(config, case, values),
             "standard": (("sample", "parameter"), points.standard),
             "probability": (("sample",), points.probability),
             "discrepancy": ((), points.discrepancy),
@@ -130,7 +246,7 @@ def dataset(config: Config, case: str, points: PointSet) -> xr.Dataset:
         },
         coords={
             "sample": np.arange(points.standard.shape[0]),
-            "parameter": random_columns(case_of(config, case)).astype(np.int8),
+            "parameter": list(parameters(config, case)),
         },
     )
 
@@ -147,7 +263,7 @@ def gf_set(config: Config, case: str, n: int, key: str) -> PointSet:
     n
         Number of points.
     key
-        What the random numbers belong to.
+        Purpose of the random numbers, see `maglev.stages.randomness.generator`.
 
     References
     ----------

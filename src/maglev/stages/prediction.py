@@ -11,8 +11,8 @@ import xarray as xr
 from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import coordinates, extremes, lost, method_number
-from maglev.stages.reads import PREDICTING
+from maglev.stages.extremes import coordinates, extremes, lost
+from maglev.stages.reads import PREDICTING, RESPONSES_OF_STUDY
 from maglev.stages.surrogate import stored_predictor
 from maglev.vocabulary import METHODS
 
@@ -41,8 +41,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``prediction``.  ``computed`` is NaN where the run lost levitation; extremes are
-        predicted there too and mean nothing.
+        Layout ``prediction``.  ``computed`` is NaN where the run lost levitation; the predicted
+        extremes mean nothing there.
 
     Raises
     ------
@@ -55,7 +55,8 @@ def dataset(
             f"surrogates of {sorted(surrogate)}"
         )
     names = sorted(design, key=METHODS.index)
-    truth, away = extremes(baseline), lost(baseline)
+    responses = config.responses_of_study
+    truth, away = extremes(baseline, responses), lost(baseline)
     points = baseline["standard"].to_numpy()
     sigma = truth[~away].std(axis=0)
     predicted, without = [], []
@@ -78,7 +79,8 @@ def dataset(
             "sigma": ("response", sigma),
         },
         coords=coordinates(
-            method=np.array([method_number(name) for name in names]),
+            responses,
+            method=names,
             sample=baseline["sample"].to_numpy(),
         ),
     )
@@ -87,7 +89,7 @@ def dataset(
 STAGE = Stage(
     name="prediction",
     of="case",
-    reads=PREDICTING,
+    reads=(*PREDICTING, *RESPONSES_OF_STUDY),
     inputs={
         "baseline": Input("runs"),
         "design": Input("design", by=("method",)),

@@ -24,14 +24,14 @@ def generator(seed: int, *key: str | int) -> np.random.Generator:
 def generator_of_statistics(seed: int, purpose: str) -> np.random.Generator:
     """Stream for statistics of finished runs: populations, bootstraps, borders.
 
-    Seeds by the CRC-32 of the purpose, not by its letters as `generator` does: the numbers in
-    print were drawn so.
+    The seed is the CRC-32 of the purpose, not its letters as in `generator`: the printed numbers
+    were drawn that way.
 
     Parameters
     ----------
     seed
         Seed of the configuration.
     purpose
-        What the numbers are for; the same words give the same numbers.
+        Purpose of the numbers; the same words give the same numbers.
     """
     return np.random.default_rng([seed, zlib.crc32(purpose.encode())])

@@ -7,39 +7,26 @@ from maglev.vocabulary import DESIGNED
 TRAIN_ON_GUIDEWAY = ("seed", "train", "guideway", "irregularity", "control", "passage")
 """Sections that decide a run of the model, beside its gains."""
 
-RUNS_OF_CASE = (
-    *TRAIN_ON_GUIDEWAY,
-    "gains",
-    "cases.{case}.n_spans",
-    "cases.{case}.coefficient_of_variation",
-    "cases.{case}.random_gains",
-    "cases.{case}.random_track",
-)
+OF_CASE = tuple(f"cases.{{case}}.{key}" for key in ("n_spans", "random", "correlation", "track"))
+"""What a case says of its runs."""
+
+RUNS_OF_CASE = (*TRAIN_ON_GUIDEWAY, "gains", *OF_CASE)
 """What the runs of a case depend on."""
 
 MEASURED = ("validation.measurements", "validation.measured_here")
-"""Whether and where there are measurements of the bridge."""
+"""Keys of the measurements on the guideway."""
 
 N_SAMPLES = ("study.mcm.n_samples", "cases.{case}.n_samples")
-"""What the size of a baseline depends on."""
+"""Keys that decide the size of a baseline."""
 
-RANDOM_GAINS = (
-    "seed",
-    "gains",
-    "cases.{case}.coefficient_of_variation",
-    "cases.{case}.random_gains",
-    *(  # with what a configuration is checked by: which gains hold the train
-        f"train.{kind}_magnet.{key}"
-        for kind in ("suspension", "guidance")
-        for key in ("gap_reference", "current_reference", "current_max")
-    ),
-    "passage.gap_contact",
-    "passage.gap_lost",
-)
-"""What points of a case are drawn by."""
+RANDOM_QUANTITIES = RUNS_OF_CASE
+"""What points of a case are drawn by: any number may be the mean of one that is random."""
 
 PREDICTING = ("seed", "study.confidence", "study.n_population")
-"""What a predictor is made with, beside the kind of its surrogate."""
+"""What a predictor is made with, beside the kind of its surrogate and the responses."""
+
+RESPONSES_OF_STUDY = ("study.responses",)
+"""What is predicted: the responses of the study, those of the limit states among them."""
 
 SURROGATE_OF_METHODS = tuple(f"study.{method}.surrogate" for method in DESIGNED)
 """The kind of surrogate of every method."""

@@ -8,7 +8,7 @@ from maglev.parameters import Config
 from maglev.stage import Stage
 from maglev.stages import points
 from maglev.stages.points import gf_set
-from maglev.stages.reads import RANDOM_GAINS
+from maglev.stages.reads import RANDOM_QUANTITIES
 from maglev.vocabulary import DESIGNED
 
 
@@ -39,7 +39,7 @@ def dataset(config: Config, case: str) -> xr.Dataset:
 STAGE = Stage(
     name="representative_points",
     of="case",
-    reads=(*RANDOM_GAINS, "study.n_representative", "study.n_counting"),
+    reads=(*RANDOM_QUANTITIES, "study.n_representative", "study.n_counting"),
     takes={"case": str},
     methods=DESIGNED,
     layout="points",

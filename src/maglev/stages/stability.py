@@ -13,30 +13,30 @@ from maglev.parameters import Config, Control
 from maglev.stage import Stage
 
 PROPORTIONAL_RANGE, DERIVATIVE_RANGE = (0.4, 1.6), (0.0, 1.6)
-"""Gains of the map over their means [-]: four deviations on either side at a coefficient of
-variation of 0.15, and down to no derivative gain, where a lag has its border."""
+"""Range of the gains of the map over their means [-]: four deviations on either side at a
+coefficient of variation of 0.15, and down to no derivative gain, where a lag has its border."""
 
 N_PROPORTIONAL, N_DERIVATIVE = 37, 25
-"""Size of the map, finer along the gain that decides."""
+"""Size of the map, finer along the decisive gain."""
 
 LAGS = (0.0, 2e-3)
 """Lags of the suspension's current whose borders are drawn [s]."""
 
 FARTHEST = 10.0
-"""How far a border is sought above the mean gains, over the mean [-]."""
+"""Upper end of the search for a border, over the mean gain [-]."""
 
 N_STEPS = 12
 """Steps of the search for a border in the map, each a tenth of the mean or less."""
 
 PROPORTIONAL, DERIVATIVE = 0, 1
-"""Places of the suspension's k_p and k_d among the gains."""
+"""Columns of the suspension's k_p and k_d among the gains."""
 
 
 def dataset(config: Config) -> xr.Dataset:
     """Map the growth rate of one car over the two gains of the suspension, and its borders.
 
-    Guidance has its mean gains.  Neighbouring cars, the elastic guideway, the limits of gap and
-    current and the nonlinear force are not in it: the passages say what they change.
+    Guidance has its mean gains.  The map leaves out neighbouring cars, the elastic guideway, the
+    limits of gap and current and the nonlinear force; the passages show their effect.
 
     Parameters
     ----------

@@ -15,8 +15,9 @@ from maglev.parameters import Config
 from maglev.stage import Input, Stage
 from maglev.stages.extremes import extremes, lost
 from maglev.stages.limits import baseline_limits, status_numbers
+from maglev.stages.reads import RESPONSES_OF_STUDY
 from maglev.uncertainty.reliability import binomial_interval
-from maglev.vocabulary import LIMIT_STATUS, METHODS, RESPONSES
+from maglev.vocabulary import LIMIT_STATUS
 
 _LOG = logging.getLogger(__name__)
 
@@ -38,13 +39,13 @@ class Check:
     kind
         ``HALVES``, ``LIMIT``, ``LOSS``, ``HELD_HALVES`` or ``HELD_LIMIT``.
     case, method
-        What was checked.
+        Checked case and method.
     response
-        Number of the response, or how many there are for none.
+        Name of the response, or ``"none"``.
     level
         Failure probability, 0 for none [-].
     value, low, high
-        What was found and the ends of what passes [-]; NaN where nothing can be said.
+        Value and ends of the range that passes [-]; NaN where the check cannot be decided.
     passed
         ``NO``, ``YES`` or ``UNDECIDED``.
     """
@@ -52,7 +53,7 @@ class Check:
     kind: int
     case: str
     method: str
-    response: int
+    response: str
     level: float
     value: float
     low: float
@@ -67,11 +68,11 @@ def dataset(
 ) -> xr.Dataset:
     """Check every case that has a baseline.
 
-    Three kinds: the limits of the baseline's two halves, their difference over the sum of those
-    parts of their intervals that face each other, which passes if the intervals meet; each
-    method's limit less the baseline's over half the interval of the latter, which passes within
-    one; each method's probability of loss, which passes within the binomial interval of the
-    baseline's count.  The first two are repeated for limits given that levitation holds.
+    There are three kinds.  The limits of the baseline's two halves: their difference over the sum
+    of the facing parts of their intervals passes if the intervals meet.  Each method's limit: its
+    difference from the baseline's over half the interval of the latter passes within one.  Each
+    method's probability of loss: it passes within the binomial interval of the baseline's count.
+    The first two are repeated for limits given that levitation holds.
 
     Parameters
     ----------
@@ -85,8 +86,8 @@ def dataset(
     Returns
     -------
     dataset
-        Layout ``statistics_check``.  A check that cannot be decided (a limit that the sample does
-        not carry) says so; one that fails is reported, not raised.
+        Layout ``statistics_check``.  A check of a limit that the sample does not carry is
+        undecided; one that fails is reported, not raised.
 
     Raises
     ------
@@ -98,9 +99,10 @@ def dataset(
     strange = sorted({case for case, _ in limits} - set(baseline))
     if strange:
         raise UserError(f"the case '{strange[0]}' has limits and no baseline; run its baseline")
+    responses = config.responses_of_study
     checks: list[Check] = []
     for case, runs in baseline.items():
-        values, away = extremes(runs), lost(runs)
+        values, away = extremes(runs, responses), lost(runs)
         checks += _halves(config, case, HALVES, values, away)
         checks += _halves(config, case, HELD_HALVES, values[~away], away[~away])
         for (of_case, method), found in limits.items():
@@ -120,7 +122,7 @@ def dataset(
             words,
             *(passed.count(code) for code in (YES, NO, UNDECIDED)),
         )
-    return _dataset(checks, list(baseline))
+    return _dataset(checks)
 
 
 def _halves(
@@ -133,7 +135,7 @@ def _halves(
         raise UserError(f"a half of the baseline of '{case}' has no run that held")
     first, second = (baseline_limits(config, values[part], away[part]) for part in parts)
     checks = []
-    for response, (a, b) in enumerate(zip(first, second, strict=True)):
+    for response, a, b in zip(config.responses_of_study, first, second, strict=True):
         codes = zip(status_numbers(a), status_numbers(b), strict=True)
         for k, (level, code) in enumerate(zip(a.failure_probability, codes, strict=True)):
             lower, upper = (a, b) if a.limit[k] <= b.limit[k] else (b, a)
@@ -157,19 +159,19 @@ def _against(
         (LIMIT, "limit", baseline_limits(config, values, away)),
         (HELD_LIMIT, "held_limit", baseline_limits(config, values[~away], away[~away])),
     ):
-        limit, status = found[name].to_numpy(), found[f"{name}_status"].to_numpy()
-        for response, truth in enumerate(truths):
-            codes = zip(status_numbers(truth), status[response], strict=True)
+        for response, truth in zip(config.responses_of_study, truths, strict=True):
+            limit, status = (
+                found[key].sel(response=response).to_numpy() for key in (name, f"{name}_status")
+            )
+            codes = zip(status_numbers(truth), status, strict=True)
             for k, (level, code) in enumerate(zip(truth.failure_probability, codes, strict=True)):
                 half = truth.half_width[k]
-                value = _ratio(limit[response, k] - truth.limit[k], half)
+                value = _ratio(limit[k] - truth.limit[k], half)
                 checks.append(_judged(kind, case, method, response, level, value, -1.0, 1.0, code))
     low, high = binomial_interval(float(np.count_nonzero(away)), away.size, config.study.confidence)
     value = float(found["lost_probability"])
     none = (_GIVEN, _GIVEN)
-    checks.append(
-        _judged(LOSS, case, method, len(RESPONSES), 0.0, value, float(low), float(high), none)
-    )
+    checks.append(_judged(LOSS, case, method, "none", 0.0, value, float(low), float(high), none))
     return checks
 
 
@@ -184,7 +186,7 @@ def _judged(
     kind: int,
     case: str,
     method: str,
-    response: int,
+    response: str,
     level: float,
     value: float,
     low: float,
@@ -214,11 +216,11 @@ def _judged(
     )
 
 
-def _dataset(checks: list[Check], cases: list[str]) -> xr.Dataset:
+def _dataset(checks: list[Check]) -> xr.Dataset:
     columns = {
         "check_kind": [one.kind for one in checks],
-        "check_case": [cases.index(one.case) for one in checks],
-        "check_method": [METHODS.index(one.method) for one in checks],
+        "check_case": [one.case for one in checks],
+        "check_method": [one.method for one in checks],
         "check_response": [one.response for one in checks],
         "check_failure_probability": [one.level for one in checks],
         "check_value": [one.value for one in checks],
@@ -226,21 +228,16 @@ def _dataset(checks: list[Check], cases: list[str]) -> xr.Dataset:
         "check_high": [one.high for one in checks],
         "check_passed": [one.passed for one in checks],
     }
-    result = xr.Dataset(
+    return xr.Dataset(
         {name: (("check",), np.array(column)) for name, column in columns.items()},
         coords={"check": np.arange(len(checks))},
     )
-    result["check_case"].attrs = {
-        "flag_values": np.arange(len(cases), dtype="int32"),
-        "flag_meanings": " ".join(cases),
-    }
-    return result
 
 
 STAGE = Stage(
     name="statistics_check",
     of="run",
-    reads=("study.confidence", "study.failure_probability"),
+    reads=("study.confidence", "study.failure_probability", *RESPONSES_OF_STUDY),
     inputs={
         "baseline": Input("runs", by=("case",)),
         "limits": Input("limits", by=("case", "method")),

@@ -24,7 +24,7 @@ from maglev.stages.reads import MEASURED
 _LOG = logging.getLogger(__name__)
 
 N_POINTS = 201
-"""Places of the curve; assumed."""
+"""Number of points of the curve; assumed."""
 
 RANGE = (0.7, 1.6)
 """Its ends over the frequency of the model; assumed."""
@@ -33,10 +33,10 @@ _VERTICAL = 2
 
 
 def dataset(config: Config, guideway_modes: xr.Dataset) -> xr.Dataset:
-    """Static deflection that each first frequency goes with, beside model and measurement.
+    """Static deflection of a beam of each first frequency, beside model and measurement.
 
-    The measured deflection is that of a passage; over the dynamic coefficient of the moving load
-    at its speed it is taken for a static one.  Of several, the first.
+    The measured deflection of a passage, divided by the dynamic coefficient of the moving load at
+    its speed, is taken for a static one.  Of several measurements the first is used.
 
     Parameters
     ----------

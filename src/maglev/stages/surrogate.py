@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +12,14 @@ import xarray as xr
 from maglev.arrays import FloatArray
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import coordinates, extremes, lost, population
+from maglev.stages.extremes import coordinates, extremes, lost, population, responses_of
 from maglev.stages.randomness import generator_of_statistics
-from maglev.stages.reads import PREDICTING, SURROGATE_OF_METHODS
+from maglev.stages.reads import PREDICTING, RESPONSES_OF_STUDY, SURROGATE_OF_METHODS
 from maglev.uncertainty.failure_region import Loss, learnt_loss
 from maglev.uncertainty.selection import Selected, fit_selected, rebuilt
 from maglev.uncertainty.sobol import sobol_indices
 from maglev.uncertainty.surrogate import relative_error
-from maglev.vocabulary import DESIGNED, SURROGATES
+from maglev.vocabulary import DESIGNED, SURROGATES, Response
 
 _LOG = logging.getLogger(__name__)
 
@@ -30,9 +31,9 @@ class Predictor:
     Parameters
     ----------
     surrogate
-        Surrogate of the six responses on the samples that held.
+        Surrogate of the responses on the samples that held.
     loss
-        Probability of lost levitation, and where.
+        Probability of loss, and the region of lost samples.
     """
 
     surrogate: Selected
@@ -43,7 +44,9 @@ class Predictor:
         return self.loss.lost_probability(points) < 0.5
 
 
-def predictor(config: Config, design: xr.Dataset, choice: str) -> Predictor:
+def predictor(
+    config: Config, design: xr.Dataset, choice: str, responses: Sequence[Response]
+) -> Predictor:
     """Fit the surrogate of a design and the region of its lost samples.
 
     Parameters
@@ -54,13 +57,16 @@ def predictor(config: Config, design: xr.Dataset, choice: str) -> Predictor:
         Layout ``design`` or ``runs``: all its samples are used.
     choice
         Kind of the surrogate, or ``"best"``.
+    responses
+        What it predicts.
 
     Raises
     ------
     UserError
         If no or too few samples held, or they cannot be fitted.
     """
-    points, values, away = design["standard"].to_numpy(), extremes(design), lost(design)
+    points, away = design["standard"].to_numpy(), lost(design)
+    values = extremes(design, responses)
     surrogate = fit_selected(points[~away], values[~away], choice)
     return Predictor(surrogate=surrogate, loss=_loss(config, points, away))
 
@@ -77,7 +83,8 @@ def stored_predictor(config: Config, design: xr.Dataset, surrogate: xr.Dataset) 
     surrogate
         Layout ``surrogate``, of this design.
     """
-    points, values, away = design["standard"].to_numpy(), extremes(design), lost(design)
+    points, away = design["standard"].to_numpy(), lost(design)
+    values = extremes(design, responses_of(surrogate))
     again = rebuilt(
         points[~away],
         values[~away],
@@ -96,7 +103,7 @@ def dataset(config: Config, method: str, design: xr.Dataset) -> xr.Dataset:
     config
         The configuration.
     method
-        ``"osm"``, ``"asm_paper"`` or ``"asm"``: says which surrogate.
+        ``"osm"``, ``"asm_paper"`` or ``"asm"``: it decides the kind of surrogate.
     design
         Layout ``design``.
 
@@ -114,7 +121,8 @@ def dataset(config: Config, method: str, design: xr.Dataset) -> xr.Dataset:
     ----------
     `maglev.uncertainty.sobol.sobol_indices`.
     """
-    found = predictor(config, design, getattr(config.study, method).surrogate)
+    responses = config.responses_of_study
+    found = predictor(config, design, getattr(config.study, method).surrogate, responses)
     surrogate, loss = found.surrogate, found.loss
     rng = generator_of_statistics(config.seed, "Sobol' indices")
     first, total = sobol_indices(surrogate, rng, config.study.confidence)
@@ -143,7 +151,7 @@ def dataset(config: Config, method: str, design: xr.Dataset) -> xr.Dataset:
             "sobol_total_low": (by_gain, total[1]),
             "sobol_total_high": (by_gain, total[2]),
         },
-        coords=coordinates(parameter=design["parameter"].to_numpy()),
+        coords=coordinates(responses, parameter=design["parameter"].to_numpy()),
     )
     result["lost_probability"].attrs["comment"] = loss_comment(loss)
     result["sobol_first"].attrs["comment"] = result["sobol_total"].attrs["comment"] = (
@@ -169,7 +177,7 @@ def _loss(config: Config, points: FloatArray, away: np.ndarray) -> Loss:
 STAGE = Stage(
     name="surrogate",
     of="method",
-    reads=(*PREDICTING, *SURROGATE_OF_METHODS),
+    reads=(*PREDICTING, *RESPONSES_OF_STUDY, *SURROGATE_OF_METHODS),
     inputs={"design": Input("design")},
     takes={"method": str},
     methods=DESIGNED,

@@ -1,4 +1,4 @@
-"""Table 1: limits of the six responses at the failure probabilities, by every method of a case."""
+"""Table 1: limits of the responses at the failure probabilities, by every method of a case."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import xarray as xr
 from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.extremes import coordinates, method_number
+from maglev.stages.extremes import coordinates, responses_of
 from maglev.stages.tables import markdown, number, of_track
-from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, METHODS, RESPONSE_UNITS, RESPONSES
+from maglev.vocabulary import GIVEN, INFINITE, LIMIT_STATUS, METHODS, RESPONSE_UNITS
 
 _OF_METHOD = tuple(
     f"{name}{end}" for name in ("limit", "held_limit") for end in ("", "_low", "_high", "_status")
@@ -65,7 +65,7 @@ def dataset(config: Config, limits: Mapping[str, xr.Dataset]) -> xr.Dataset:
     result = xr.Dataset(
         variables,
         coords=coordinates(
-            method=np.array([method_number(name) for name in names]), failure_probability=levels
+            responses_of(limits[names[0]]), method=names, failure_probability=levels
         ),
     )
     for name in ("limit", "lost_probability"):
@@ -79,9 +79,9 @@ def dataset(config: Config, limits: Mapping[str, xr.Dataset]) -> xr.Dataset:
 def rows(table: xr.Dataset) -> list[dict[str, object]]:
     """The table as rows of a CSV file: one per response, failure probability and method."""
     found: list[dict[str, object]] = []
-    for r, response in enumerate(RESPONSES):
+    for r, response in enumerate(responses_of(table)):
         for p, level in enumerate(table["failure_probability"].to_numpy()):
-            for m, code in enumerate(table["method"].to_numpy()):
+            for m, method in enumerate(table["method"].to_numpy().tolist()):
                 at = {"response": r, "failure_probability": p, "method": m}
                 one = table.isel(at)
                 found.append(
@@ -90,7 +90,7 @@ def rows(table: xr.Dataset) -> list[dict[str, object]]:
                         "track": str(table.attrs.get("track", "")),
                         "unit": RESPONSE_UNITS[response],
                         "failure_probability": float(level),
-                        "method": METHODS[code],
+                        "method": method,
                         "n_runs": int(one["table_n_runs"]),
                         "limit": float(one["table_limit"]),
                         "limit_low": float(one["table_limit_low"]),
@@ -107,13 +107,13 @@ def rows(table: xr.Dataset) -> list[dict[str, object]]:
 
 def text(table: xr.Dataset, heading: str) -> str:
     """The table in Markdown: a row per response and failure probability, a column per method."""
-    codes = table["method"].to_numpy()
+    methods = table["method"].to_numpy().tolist()
     header = [
         "response",
         "failure probability",
         *(
-            f"{METHODS[code]}, {int(n)} runs"
-            for code, n in zip(codes, table["table_n_runs"], strict=True)
+            f"{method}, {int(n)} runs"
+            for method, n in zip(methods, table["table_n_runs"], strict=True)
         ),
     ]
     by_place = {
@@ -125,9 +125,9 @@ def text(table: xr.Dataset, heading: str) -> str:
             [
                 f"{response} [{RESPONSE_UNITS[response]}]",
                 f"{level:g}",
-                *(_cell(by_place[response, float(level), METHODS[code]], prefix) for code in codes),
+                *(_cell(by_place[response, float(level), one], prefix) for one in methods),
             ]
-            for response in RESPONSES
+            for response in responses_of(table)
             for level in table["failure_probability"].to_numpy()
         ]
 
@@ -147,7 +147,7 @@ def text(table: xr.Dataset, heading: str) -> str:
 
 
 def _cell(row: Mapping[str, object], prefix: str) -> str:
-    """A limit with its interval, or why there is none."""
+    """A limit with its interval, or the reason for none."""
     status = row[f"{prefix}status"]
     if status == INFINITE:
         return "none, losses are likelier"

@@ -52,7 +52,7 @@ def write(
     *,
     demonstration: bool,
 ) -> None:
-    """Write a table as CSV and Markdown, both marked where it is no result.
+    """Write a table as CSV and Markdown, both marked if it is a demonstration.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def write(
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text aside and rename it into place."""
+    """Write a text aside and rename it."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = path.with_name(f".{path.name}.{os.getpid()}.part")

@@ -47,8 +47,8 @@ def dataset(
     """
     if part not in TRACK_PARTS:
         raise UserError(f"part must be one of {', '.join(TRACK_PARTS)}, got '{part}'")
-    if not case_of(config, case).random_track:
-        raise UserError(f"cases.{case}.random_track must be true for its part '{part}'")
+    if case_of(config, case).track != "random":
+        raise UserError(f"cases.{case}.track must be random for its part '{part}'")
     n = n_samples(config, case)
     standard = baseline(config, case, n, "other gains" if part == "other_gains" else "baseline")
     if part == "track_only":

@@ -12,13 +12,13 @@ from maglev.arrays import FloatArray
 from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.density import places
+from maglev.stages.density import grid
 from maglev.stages.extremes import coordinates, extremes, lost
 from maglev.stages.randomness import generator_of_statistics
+from maglev.stages.reads import RESPONSES_OF_STUDY
 from maglev.uncertainty.gdee import direct_density, silverman_bandwidth
 from maglev.uncertainty.samples import held_part
 from maglev.uncertainty.shares import pick_freeze_shares
-from maglev.vocabulary import RESPONSES
 
 _LOG = logging.getLogger(__name__)
 
@@ -61,17 +61,18 @@ def dataset(
         raise UserError(f"all sets of runs must have {n} samples, got {sizes}; run them again")
     names = ("gains_only", "track_only")
     sets = {"both": both, **{name: parts[name] for name in names}}
-    values = {name: extremes(part) for name, part in {"both": both, **parts}.items()}
+    responses = config.responses_of_study
+    values = {name: extremes(part, responses) for name, part in {"both": both, **parts}.items()}
     kept = ~np.logical_or.reduce(
         [lost(part) for part in (both, parts["other_track"], parts["other_gains"])]
     )
     rng = generator_of_statistics(config.seed, "bootstrap of the shares")
     rows, shares = [], []
-    for response, name in enumerate(RESPONSES):
+    for response, name in enumerate(responses):
         held = {key: held_part(values[key][:, response], lost(part)) for key, part in sets.items()}
         together = np.concatenate([one.values for one in held.values()])
         widest = max(silverman_bandwidth(one.values) for one in held.values())
-        at = places(together, np.full(together.size, 1 / together.size), widest)
+        at = grid(together, np.full(together.size, 1 / together.size), widest)
         rows.append(
             {
                 "value": at,
@@ -106,7 +107,7 @@ def dataset(
             columns[f"{kind}{suffix}"] = (("response",), ends[:, k, end])
     result = xr.Dataset(
         {**columns, "n_runs": ((), n * (1 + len(parts)))},
-        coords=coordinates(cell=np.arange(columns["value"][1].shape[1])),
+        coords=coordinates(responses, cell=np.arange(columns["value"][1].shape[1])),
     )
     result["gains_share"].attrs["comment"] = (
         f"{np.count_nonzero(kept)} of {n} samples, those of which all three runs held"
@@ -117,7 +118,7 @@ def dataset(
 STAGE = Stage(
     name="track_split",
     of="case",
-    reads=("seed", "study.confidence"),
+    reads=("seed", "study.confidence", *RESPONSES_OF_STUDY),
     inputs={"baseline": Input("runs"), "track_runs": Input("runs", by=("part",))},
     layout="track_split",
     compute=dataset,

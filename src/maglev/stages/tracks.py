@@ -11,9 +11,9 @@ from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Stage
 from maglev.stages.extremes import coordinates, extremes
-from maglev.stages.points import marginals, track_seeds
+from maglev.stages.points import marginals, seeds_of_line
 from maglev.stages.randomness import generator
-from maglev.stages.reads import RUNS_OF_CASE
+from maglev.stages.reads import RESPONSES_OF_STUDY, RUNS_OF_CASE
 from maglev.stages.runs import runs
 from maglev.uncertainty.pointset import sobol_points
 from maglev.vocabulary import GAINS
@@ -52,7 +52,7 @@ def dataset(config: Config, case: str, store: str | Path, n_threads: int = 1) ->
     settings = config.study.tracks
     n_tracks, n = settings.n_tracks, settings.n_gains
     points = sobol_points(marginals(config, case), n, generator(config.seed, "gains on tracks"))
-    seeds = np.concatenate([[config.seed], track_seeds(config, n_tracks - 1, "tracks")])
+    seeds = seeds_of_line(config, n_tracks)
     whole = runs(
         config,
         case,
@@ -63,6 +63,7 @@ def dataset(config: Config, case: str, store: str | Path, n_threads: int = 1) ->
         n_threads=n_threads,
     )
     first = whole.isel(sample=slice(n))
+    responses = config.responses_of_study
     result = xr.Dataset(
         {
             **{name: ("sample", first[name].to_numpy()) for name in GAINS},
@@ -70,7 +71,7 @@ def dataset(config: Config, case: str, store: str | Path, n_threads: int = 1) ->
             "seed_of_track": ("track", seeds),
             "extreme": (
                 ("track", "sample", "response"),
-                extremes(whole).reshape(n_tracks, n, -1),
+                extremes(whole, responses).reshape(n_tracks, n, -1),
             ),
             "status_on_track": (
                 ("track", "sample"),
@@ -78,7 +79,10 @@ def dataset(config: Config, case: str, store: str | Path, n_threads: int = 1) ->
             ),
         },
         coords=coordinates(
-            track=np.arange(n_tracks), sample=np.arange(n), parameter=whole["parameter"].to_numpy()
+            responses,
+            track=np.arange(n_tracks),
+            sample=np.arange(n),
+            parameter=whole["parameter"].to_numpy(),
         ),
     )
     result.attrs["track"] = f"{n_tracks} tracks"
@@ -88,7 +92,7 @@ def dataset(config: Config, case: str, store: str | Path, n_threads: int = 1) ->
 STAGE = Stage(
     name="tracks",
     of="case",
-    reads=(*RUNS_OF_CASE, "study.tracks.n_tracks", "study.tracks.n_gains"),
+    reads=(*RUNS_OF_CASE, *RESPONSES_OF_STUDY, "study.tracks.n_tracks", "study.tracks.n_gains"),
     takes={"case": str, "store": Path, "n_threads": int},
     layout="tracks",
     compute=dataset,

@@ -71,10 +71,10 @@ def radial_sum(
     weights : (sample, response)
         Their weights.
     points : (point, parameter)
-        Where the sum is wanted.
+        Points at which the sum is evaluated.
     total : (point, response)
-        What the sum is added to; each row by one thread, so the result does not depend on how
-        many there are.
+        Receives the sum, added; one thread computes each row, so that the result does not depend
+        on their number.
     """
     for i in prange(points.shape[0]):
         for j in range(centres.shape[0]):
@@ -101,7 +101,7 @@ def radial_sum_gradient(
     Parameters are those of ``radial_sum`` but for
 
     total : (point, response, parameter)
-        What the gradient is added to.
+        Receives the gradient, added.
     """
     for i in range(points.shape[0]):
         for j in range(centres.shape[0]):

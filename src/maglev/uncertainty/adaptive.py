@@ -4,7 +4,7 @@
     for batch in stored:
         state = absorb(state, batch.points, batch.values, batch.lost, batch.predicted)
 
-Everything that is decided follows from this stored history, so to resume is to read it once more.
+Every decision follows from this stored history, so a design is resumed by reading it once more.
 """
 
 from collections.abc import Callable
@@ -76,10 +76,10 @@ class Proposal:
     points : (new, parameter)
         Standardised points to run [-].
     predicted : (new, response)
-        What the surrogate says of them before they are run [unit of the response]; to be stored
+        Predictions of the surrogate before the runs [unit of the response]; to be stored
         with the batch and given to ``absorb``.
     surrogate
-        The surrogate they were chosen by.
+        The surrogate that the choice is based on.
     """
 
     points: FloatArray
@@ -99,7 +99,7 @@ def absorb(
     Parameters
     ----------
     state
-        What is known so far.
+        Samples and outcomes so far.
     points : (new, parameter)
         Standardised points that were run [-].
     values : (new, response)
@@ -113,7 +113,7 @@ def absorb(
     Returns
     -------
     state
-        What is known now.
+        The state with the batch.
 
     Raises
     ------
@@ -205,11 +205,11 @@ def propose(
     Parameters
     ----------
     state
-        What is known so far.
+        Samples and outcomes so far.
     fit
         Fits the surrogate to points and values of the samples that held.
     batch
-        The criterion that chooses, such as ``learning.taylor_batch`` with its options bound.
+        The criterion of choice, such as ``learning.taylor_batch`` with its options bound.
     candidates : (candidate, parameter)
         Standardised points to choose from [-].
     n_new
@@ -241,23 +241,24 @@ def propose(
 
 
 def decision(state: AdaptiveState, *, threshold: float, n_rounds: int, n_largest: int) -> str:
-    """Decide whether to go on, or why to stop; a word of `maglev.vocabulary.DECISIONS`.
+    """Decide whether to go on, or for which reason to stop.
 
     Parameters
     ----------
     state
-        What is known so far.
+        Samples and outcomes so far.
     threshold
         Error of a round, in standard deviations of each response, that counts as small [-].
     n_rounds
-        How many of the last rounds must all stay at or below it, each tested, in every response.
+        Number of last rounds that must all stay at or below it, each tested, in every response.
     n_largest
         Largest number of runs, lost ones included.
 
     Returns
     -------
     decision
-        Small errors come before the largest number of runs.
+        A word of `maglev.vocabulary.DECISIONS`; small errors take precedence over the largest
+        number of runs.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Region of lost samples: its learnt border, its probability, their uncertainty.
 
-Whether a sample is lost is no matter of chance: there is a border g(u) = βᵀf(u) = 0, sharp but not
-known.  Its posterior is a set of borders, drawn so that each agrees with the samples seen; what
-they disagree about is the uncertainty.
+The outcome of a sample is not random: a border g(u) = βᵀf(u) = 0, sharp but unknown, separates held
+from lost.  Its posterior is a set of borders that agree with the samples; their disagreement is the
+uncertainty.
 """
 
 from dataclasses import dataclass
@@ -24,15 +24,15 @@ PRIOR_DEVIATION = {"constant": 6.0, "linear": 1.0, "quadratic": 0.1}
 standard deviations from the mean of the inputs, bent a little."""
 
 SHARPNESS = 20.0
-"""Log-odds per unit of g [-]; assumed: a border that is blurred over a twentieth of a standard
-deviation of the inputs, which also forgives a border that is not quite quadratic."""
+"""Log-odds per unit of g [-]; assumed: it blurs the border over a twentieth of a standard deviation
+of the inputs, so that the true border need not be exactly quadratic."""
 
 N_DRAWS, N_BETWEEN, N_BEFORE = 200, 10, 500
 """Borders kept, steps of the chain between two of them, steps before the first; assumed, and
 checked against a border whose posterior is known."""
 
 N_POOL = 1024
-"""Candidates that are compared in full, those in most doubt first; assumed."""
+"""Largest number of candidates compared in full, the most doubtful ones; assumed."""
 
 SETTLED = 1e-6
 """Variance of an outcome below which all borders agree on it [-]; assumed, a thousandth of the
@@ -127,7 +127,7 @@ def fit_failure_region(
     points : (sample, parameter)
         Every standardised sample, held or lost [-].
     lost : (sample,) of bool
-        Which samples were lost.
+        Whether each sample was lost.
     rng
         Source of the draws.
 
@@ -189,7 +189,7 @@ class Loss:
     lower, upper
         Ends of its interval [-].
     region
-        The learnt region; None where no sample was lost, and then nothing is known of where.
+        The learnt region; None where no sample was lost.
     """
 
     probability: float
@@ -214,15 +214,15 @@ def learnt_loss(
     """Probability of loss from the learnt region, or, without a lost sample, by counting.
 
     With lost samples the interval is the credible one of the region.  Without, the estimate is
-    zero and the upper end is the exact binomial one; it takes the samples as drawn at random, and
-    so is too wide for a design that goes for the tails.
+    zero and the upper end the exact binomial one for samples drawn at random; for a design that
+    prefers the tails it is too wide.
 
     Parameters
     ----------
     points : (sample, parameter)
         Every standardised sample, held or lost [-].
     lost : (sample,) of bool
-        Which samples were lost.
+        Whether each sample was lost.
     population : (point, parameter)
         Equally likely draws from the input density, standardised [-].
     rng
@@ -277,7 +277,7 @@ def border_batch(
     *,
     scores: FloatArray | None = None,
 ) -> IntArray:
-    """Candidates with the most information on the probability of loss.
+    """Candidates that most reduce the variance of the probability of loss.
 
     With I_d(c) the outcome at c and P_d the probability of being lost, both for border d, the
     variance of P that a run at c takes away is cov(I(c), P)²/var I(c).  After each choice the part
@@ -334,15 +334,15 @@ def border_batch(
     outcome = outcome - outcome.mean(axis=1, keepdims=True)
     chosen = np.empty(n_new, dtype=np.int64)
     free = np.ones(pool.size, dtype=bool)
-    for place in range(n_new):
+    for k in range(n_new):
         square = np.einsum("cd,cd->c", outcome, outcome)
         known = square <= SETTLED * outcome.shape[1]
         gain = np.where(known, 0.0, (outcome @ total) ** 2 / np.where(known, 1.0, square))
         best = int(np.argmax(np.where(free, gain, -1.0)))
         free[best] = False
-        chosen[place] = pool[best]
+        chosen[k] = pool[best]
         if scores is not None:
-            scores[place] = gain[best] / total.size
+            scores[k] = gain[best] / total.size
         if not known[best]:
             explained = outcome[best] / np.sqrt(square[best])
             total = total - (total @ explained) * explained

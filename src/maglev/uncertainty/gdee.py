@@ -1,7 +1,7 @@
 """Probability density evolution: from weighted extreme values to their density.
 
-The finite-difference solution adds a numerical kernel to the weighted points and nothing else, so
-the mesh is the bandwidth; it is chosen by a rule here.  Theory: docs/theory/pdem.md.
+The finite-difference solution smooths the weighted points by a numerical kernel, so the mesh acts
+as a bandwidth; a rule chooses it here.  Theory: docs/theory/pdem.md.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import gaussian_kde, norm
 
-from maglev.arrays import FloatArray
+from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.uncertainty import _kernels
 from maglev.uncertainty.samples import (
@@ -33,10 +33,10 @@ _LIMITERS = {
 }
 
 COURANT = 0.9
-"""Largest Courant number the time step aims at [-]; 1 would be exact for one point.  Assumed."""
+"""Courant number that the time step aims at [-]; 1 would be exact for one point.  Assumed."""
 
 START = 3.0
-"""How far below the smallest value a virtual process starts [standard deviations].
+"""Distance below the smallest value at which a virtual process starts [standard deviations].
 
 A process that starts among the values moves those near its start too little for the scheme to
 spread them, and the density keeps their spikes.  Assumed; see docs/theory/pdem.md, section 4.
@@ -73,9 +73,9 @@ class EvolvedDensity:
     largest_courant
         Largest Courant number of any point and step [-].
     bandwidth
-        Kernel deviation the mesh rule asked for, Silverman's [unit].
+        Kernel deviation that the rule of the mesh aims at, Silverman's [unit].
     kernel_deviation
-        Root mean square deviation of the numerical kernel that came out [unit].
+        Root mean square deviation of the resulting numerical kernel [unit].
     start
         Value at which the virtual process starts [unit].
     """
@@ -103,7 +103,7 @@ class FirstPassage:
     cell_centre : (cell,)
         Centres of the cells [unit of the histories].
     density : (cell,)
-        Density of what remains at the last time [1/unit]; its integral is the last ``survival``.
+        Density that remains at the last time [1/unit]; its integral is the last ``survival``.
     mesh
         Cell width used [unit].
     """
@@ -154,7 +154,7 @@ def evolved_density(
     Returns
     -------
     evolved
-        The density with the mesh, the step and the kernel that made it.
+        The density with its mesh, step and kernel.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def evolved_density(
     values, probability = weighted_sample(values, probability)
     if process not in ("sine", "linear"):
         raise UserError(f"process must be 'sine' or 'linear', got {process!r}")
-    code = _limiter_code(limiter)
+    code = limiter_code(limiter)
     check_lost_probability(lost_probability)
     if mesh is not None and not (np.isfinite(mesh) and mesh > 0.0):
         raise UserError(f"mesh must be positive, got {mesh} standard deviations")
@@ -213,10 +213,10 @@ def density_with_strays(
     *,
     lost_probability: float = 0.0,
 ) -> tuple[EvolvedDensity, bool] | None:
-    """Density of the values by PDEM; if they spread too far, of their logarithms.
+    """Density of the values by PDEM, or of their logarithms if the values spread too far.
 
-    A few values far out ask for more time steps than are sensible.  The logarithms of positive
-    values may not; their density p_L is mapped back by ``p(y) = p_L(ln y) / y``.
+    A few values far out need too many time steps.  The logarithms of positive values may need
+    fewer; their density p_L is mapped back by ``p(y) = p_L(ln y) / y``.
 
     Parameters
     ----------
@@ -226,9 +226,9 @@ def density_with_strays(
     Returns
     -------
     evolved, logarithmic
-        The density and whether it went by the logarithm: ``mesh``, ``bandwidth`` and
+        The density and whether it was found by the logarithm: ``mesh``, ``bandwidth`` and
         ``kernel_deviation`` are then those at the mean of the values, and the cells grow with the
-        value.  None if the evolution refuses both: `direct_density` is what is left.
+        value.  None if the evolution refuses both; `direct_density` then remains.
 
     Raises
     ------
@@ -289,8 +289,8 @@ def direct_density(
 
     Parameters
     ----------
-    at : (place,)
-        Where the density is wanted [unit of the value].
+    at : (value,)
+        Values at which the density is wanted [unit of the value].
     values : (sample,)
         Extreme values of the held samples [their unit].
     probability : (sample,), optional
@@ -302,13 +302,13 @@ def direct_density(
 
     Returns
     -------
-    density : (place,)
+    density : (value,)
         Density of the held part [1/unit]; its integral is one less ``lost_probability``.
 
     Raises
     ------
     UserError
-        If the sample is faulty or constant, ``bandwidth`` is not positive, a place is not finite
+        If the sample is faulty or constant, ``bandwidth`` is not positive, a value is not finite
         or ``lost_probability`` lies outside [0, 1).
 
     References
@@ -326,7 +326,7 @@ def direct_density(
     check_lost_probability(lost_probability)
     at = np.asarray(at, dtype=float)
     if at.ndim != 1 or not np.all(np.isfinite(at)):
-        raise UserError(f"places must be finite and have shape (place,), got shape {at.shape}")
+        raise UserError(f"values must be finite and have shape (value,), got shape {at.shape}")
     mean, deviation = _moments(values, probability)
     if bandwidth is None:
         bandwidth = silverman_bandwidth(values, probability)
@@ -356,13 +356,13 @@ def direct_density_band(
 
     Parameters
     ----------
-    at : (place,)
-        Where the density is given [unit of the value].
+    at : (value,)
+        Values at which the density is given [unit of the value].
     values : (sample,)
         Values that held [their unit].
     n
         Number of all runs.
-    density : (place,)
+    density : (value,)
         The direct density [1/unit].
     bandwidth
         Its kernel deviation h [unit].
@@ -373,7 +373,7 @@ def direct_density_band(
 
     Returns
     -------
-    low, high : (place,)
+    low, high : (value,)
         Ends of the band [1/unit]; the lower one is at least 0.
 
     References
@@ -448,13 +448,14 @@ def first_passage(
     mesh: float,
     lower: float | None = None,
     upper: float | None = None,
+    held_until: npt.ArrayLike | None = None,
     limiter: Limiter = "superbee",
 ) -> FirstPassage:
     """Survival of weighted histories between barriers, by the GDEE with absorbing boundaries.
 
-    Probability that reaches a barrier is taken out and does not come back.  Histories are straight
-    between the given times, and those intervals are divided as the Courant number asks.  The
-    kernel reaches a barrier about its own width early: compare ``exact_survival``.
+    Probability that reaches a barrier is removed for good.  Histories are straight between the
+    given times; whole cells are gone exactly, the rest of an interval by one step of the scheme.
+    The kernel reaches a barrier about its own width early: compare ``exact_survival``.
 
     Parameters
     ----------
@@ -466,13 +467,16 @@ def first_passage(
         Cell width [unit], at most; made smaller so that the barriers lie on faces.
     lower, upper
         Barriers [unit]; at least one.
+    held_until : (sample,), optional
+        Number of the last time at which each history is there; it leaves with all its probability
+        before the next, as if it had reached a barrier.  All stay to the end if not given.
     limiter
         Flux limiter, ``"superbee"``, ``"minmod"`` or ``"upwind"``.
 
     Returns
     -------
     passage
-        Survival over time and the density of what remains.
+        Survival over time and the remaining density.
 
     Raises
     ------
@@ -491,19 +495,9 @@ def first_passage(
     >>> round(float(found.exact_survival[-1]), 3)  # three of five stay below
     0.6
     """
-    histories = np.asarray(histories, dtype=float)
-    if histories.ndim != 2 or histories.shape[0] < 1 or histories.shape[1] < 2:
-        raise UserError(
-            f"histories have shape {histories.shape}, expected (sample, time) with two times or "
-            "more"
-        )
-    if not np.all(np.isfinite(histories)):
-        raise UserError("histories must be finite, got NaN or infinity; leave lost samples out")
+    histories, probability, until = checked_histories(histories, probability, held_until)
     n = len(histories)
-    if probability is None:
-        probability = np.full(n, 1.0 / n)
-    probability = checked_probability(probability, n)
-    code = _limiter_code(limiter)
+    code = limiter_code(limiter)
     if not (np.isfinite(mesh) and mesh > 0.0):
         raise UserError(f"mesh must be positive, got {mesh}")
     if lower is None and upper is None:
@@ -519,8 +513,7 @@ def first_passage(
     if np.isfinite(low) and np.isfinite(high):
         mesh = (high - low) / np.ceil((high - low) / mesh)
     increments = np.diff(histories, axis=1) / mesh
-    substeps = max(1, int(np.ceil(np.abs(increments).max() / COURANT)))
-    margin = _margin(substeps * increments.shape[1])
+    margin = margin_of(increments.shape[1])
     # Cells outside a barrier stay empty but for the one a step can reach before it is removed.
     face = low if np.isfinite(low) else high
     n_below = int(np.ceil((face - max(low, histories.min())) / mesh)) + margin
@@ -535,11 +528,11 @@ def first_passage(
     total = np.zeros(n_cells)
     survival = np.zeros(histories.shape[1])
     _kernels.evolve(
-        increments / substeps,
-        substeps,
+        increments,
         cells[:, 0],
         cells[:, 1],
         probability,
+        until,
         code,
         first_kept,
         past_kept,
@@ -548,8 +541,9 @@ def first_passage(
         survival,
         np.zeros(n),
     )
-    reached = (histories <= low) | (histories >= high)
-    exact_survival = probability @ ~np.logical_or.accumulate(reached, axis=1)
+    gone = (histories <= low) | (histories >= high)
+    gone |= np.arange(histories.shape[1]) > until[:, None]
+    exact_survival = probability @ ~np.logical_or.accumulate(gone, axis=1)
     return FirstPassage(
         survival=survival,
         exact_survival=exact_survival,
@@ -557,6 +551,63 @@ def first_passage(
         density=total / mesh,
         mesh=float(mesh),
     )
+
+
+def checked_histories(
+    histories: npt.ArrayLike,
+    probability: npt.ArrayLike | None = None,
+    held_until: npt.ArrayLike | None = None,
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Weighted histories as checked arrays; what they do after their last time is left out.
+
+    Parameters
+    ----------
+    histories : (sample, time)
+        Response of every point at the same times [its unit]; anything after ``held_until``.
+    probability : (sample,), optional
+        Assigned probabilities [-]; equal if not given.
+    held_until : (sample,), optional
+        Number of the last time at which each history is there; the last of all if not given.
+
+    Returns
+    -------
+    histories, probability, held_until
+        The same, as arrays; histories stand still after their last time.
+
+    Raises
+    ------
+    UserError
+        If a shape is wrong, a history is not finite while it is there, probabilities are negative
+        or do not sum to one, or a last time is none of the times.
+    """
+    histories = np.asarray(histories, dtype=float)
+    if histories.ndim != 2 or histories.shape[0] < 1 or histories.shape[1] < 2:
+        raise UserError(
+            f"histories have shape {histories.shape}, expected (sample, time) with two times or "
+            "more"
+        )
+    n, n_times = histories.shape
+    weight = np.full(n, 1.0 / n) if probability is None else checked_probability(probability, n)
+    until = np.full(n, n_times - 1) if held_until is None else np.asarray(held_until)
+    if until.shape != (n,) or until.dtype.kind not in "iu":
+        raise UserError(
+            f"held_until must be {n} whole numbers, one for each history, got {until.dtype} of "
+            f"shape {until.shape}"
+        )
+    if (until < 0).any() or (until >= n_times).any():
+        raise UserError(
+            f"held_until must number one of {n_times} times, from 0 to {n_times - 1}, got "
+            f"{until.min()} to {until.max()}"
+        )
+    after = np.arange(n_times) > until[:, None]
+    last = np.take_along_axis(histories, until[:, None], axis=1)
+    histories = np.where(after, last, histories)
+    if not np.all(np.isfinite(histories)):
+        raise UserError(
+            "histories must be finite while they are there, got NaN or infinity; say with "
+            "held_until when a sample is lost"
+        )
+    return histories, weight, until
 
 
 def _virtual_evolution(
@@ -583,7 +634,7 @@ def _virtual_evolution(
         )
     tau = np.arange(n_steps + 1) / n_steps
     g = np.sin(2.5 * np.pi * tau) if process == "sine" else tau
-    margin = _margin(n_steps)
+    margin = margin_of(n_steps)
     backward = -min(0.0, float(travel.min()), *([-float(travel.max())] * (process == "sine")))
     forward = max(0.0, float(travel.max()), *([-float(travel.min())] * (process == "sine")))
     n_below, n_above = int(np.ceil(backward)) + margin, int(np.ceil(forward)) + margin
@@ -595,10 +646,10 @@ def _virtual_evolution(
         part = slice(a, a + _CHUNK)
         _kernels.evolve(
             np.outer(travel[part], increment),
-            1,
             np.full(travel[part].size, float(n_below)),
             n_below + travel[part],
             probability[part],
+            np.full(travel[part].size, n_steps),
             limiter,
             0,
             n_cells,
@@ -640,7 +691,7 @@ def _mesh_by_rule(
     return mesh
 
 
-def _margin(n_steps: int) -> int:
+def margin_of(n_steps: int) -> int:
     """Cells beyond the farthest value: eight deviations of the widest (upwind) kernel."""
     return int(np.ceil(4.0 * np.sqrt(n_steps))) + 4  # variance n c (1 - c) <= n / 4, scheme's reach
 
@@ -657,7 +708,14 @@ def _moments(values: FloatArray, probability: FloatArray) -> tuple[float, float]
     return mean, deviation
 
 
-def _limiter_code(limiter: str) -> int:
+def limiter_code(limiter: str) -> int:
+    """Code of a flux limiter in the kernels.
+
+    Raises
+    ------
+    UserError
+        If there is no such limiter.
+    """
     if limiter not in _LIMITERS:
         raise UserError(f"limiter must be one of {', '.join(_LIMITERS)}, got {limiter!r}")
     return _LIMITERS[limiter]

@@ -1,7 +1,7 @@
 """Kriging: Gaussian processes with a Matérn 5/2 covariance and one length per input.
 
-scikit-learn supplies the covariance, its likelihood and the factorisation; gradient,
-leave-one-out, covariance and the fast sums, which it lacks, are formulas on what it found.
+scikit-learn supplies the covariance, its likelihood and the factorisation; gradient, leave-one-out,
+covariance and fast sums, which it lacks, are computed here from its factors.
 """
 
 from dataclasses import dataclass
@@ -23,13 +23,13 @@ NUGGET = 1e-10
 scikit-learn, which keeps the factorisation possible and is far below any error of interest."""
 
 LENGTH_RANGE = (0.1, 1e3)
-"""Lengths that are tried, in standard deviations of the input [-]; assumed."""
+"""Range of lengths, in standard deviations of the input [-]; assumed."""
 
 AMPLITUDE_RANGE = (1e-3, 1e5)
-"""Prior variances that are tried, over the variance of the response [-]; assumed."""
+"""Range of prior variances, over the variance of the response [-]; assumed."""
 
 STARTS = (1.0, 3.0, 10.0)
-"""Equal lengths from the likeliest of which the search starts [-]; assumed."""
+"""Trial lengths, equal for all inputs; the search starts from the likeliest [-]; assumed."""
 
 BLOCK = 4096
 """Points per block where a matrix (point, sample) is needed; bounds the memory; assumed."""
@@ -267,8 +267,8 @@ def fit_kriging(points: npt.ArrayLike, values: npt.ArrayLike) -> Kriging:
     """Find lengths and prior variance of each response by maximum likelihood.
 
     Every response has a Gaussian process of its own: constant mean, Matérn 5/2 covariance, one
-    length per input.  The search starts from the likeliest of ``STARTS``, hence from nothing but
-    the data: the same data give the same surrogate.
+    length per input.  The search starts from the likeliest of ``STARTS``, so the same data give
+    the same surrogate.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Learning functions: scores of candidates, and batches of the next points.
 
 Both criteria have the same form, ``batch(surrogate, occupied, candidates, n_new, ...)``:
-``taylor_batch`` is the published one and looks at the surrogate alone; ``tail_batch`` knows the
-input density and the limits that are wanted, and needs a surrogate with a standard deviation.
+``taylor_batch`` is the published one and uses the surrogate alone; ``tail_batch`` uses the input
+density and the levels of the limits too, and needs a surrogate with a standard deviation.
 """
 
 from collections.abc import Sequence
@@ -18,23 +18,23 @@ from maglev.uncertainty.samples import weighted_quantile
 from maglev.uncertainty.surrogate import Surrogate, SurrogateWithDeviation, checked_points
 
 AGGREGATES = ("sum", "maximum")
-"""How the scores of several responses become one: summed, or the largest."""
+"""Ways to combine the scores of several responses: their sum, or the largest."""
 
 EXCEEDANCES = (1e-1, 1e-2, 1e-3)
-"""Probabilities of exceedance whose limits decide, unless others are given [-]."""
+"""Probabilities of exceedance whose limits guide the choice, by default [-]."""
 
 BAND = 0.1
-"""Half-width of the band around a limit in which the surrogate has to be right, over the standard
+"""Half-width of the band around a limit in which the surrogate must be accurate, over the standard
 deviation of the response [-]; assumed."""
 
 N_NODES = 256
-"""Points that stand for the neighbourhood of one limit; assumed."""
+"""Number of nodes that represent the neighbourhood of one limit; assumed."""
 
 N_POOL = 1024
-"""Candidates that are compared in full, nodes first; assumed."""
+"""Largest number of candidates compared in full, nodes first; assumed."""
 
 SETTLED = 1e-8
-"""Variance, over that of the response, below which a candidate has nothing left to tell [-];
+"""Variance, over that of the response, below which a candidate is taken as known [-];
 assumed, a hundred times the nugget of the Kriging."""
 
 
@@ -191,12 +191,12 @@ def taylor_batch(
     remainder = taylor_remainder(surrogate, candidates)
     domain = _diameter(np.concatenate([occupied, candidates]))
     chosen = np.empty(n_new, dtype=np.int64)
-    for place in range(n_new):
+    for k in range(n_new):
         score = held * taylor_scores(distance, remainder, domain, aggregate)
         score[distance == 0.0] = -np.inf
-        best = chosen[place] = np.argmax(score)
+        best = chosen[k] = np.argmax(score)
         if scores is not None:
-            scores[place] = score[best]
+            scores[k] = score[best]
         remainder[best] = 0.0
         distance = np.minimum(distance, np.linalg.norm(candidates - candidates[best], axis=1))
     return chosen
@@ -264,11 +264,12 @@ def tail_batch(
     """Candidates that most reduce the variance of the surrogate near the limits.
 
     Every limit of every response is a target.  Its neighbourhood is a set of nodes, drawn from the
-    candidates with weight exp(−(ŷ − y_P)²/2v)/√v, v = s² + (b σ)²: near the limit by prediction, or
-    so uncertain that they may be.  As candidates are draws from the input density, so are the
-    nodes.  The gain of a candidate c for a target is the mean over its nodes of the variance that
-    a run at c would take away, cov(node, c)²/s²(c), over the variance of the response.  After each
-    choice variances and covariances are those with the chosen point run, which needs no value.
+    candidates with weight exp(−(ŷ − y_P)²/2v)/√v, v = s² + (b σ)²: points that are predicted near
+    the limit, or so uncertain that they may be.  As candidates are draws from the input density, so
+    are the nodes.  The gain of a candidate c for a target is the mean over its nodes of the
+    reduction of variance by a run at c, cov(node, c)²/s²(c), over the variance of the response.
+    After each choice variances and covariances are updated as if the point had been run; this needs
+    no value.
 
     Parameters
     ----------
@@ -352,7 +353,7 @@ def tail_batch(
     rows: list[list[FloatArray]] = [[] for _ in scale]
     free = np.ones(pool.size, dtype=bool)
     chosen = np.empty(n_new, dtype=np.int64)
-    for place in range(n_new):
+    for k in range(n_new):
         gains = np.empty((len(joint), pool.size))
         for target, (response, between) in enumerate(joint):
             known = variance[response] <= SETTLED * scale[response] ** 2
@@ -362,9 +363,9 @@ def tail_batch(
         gain = np.where(free, held[pool] * gain, -np.inf)
         best = int(np.argmax(gain))
         free[best] = False
-        chosen[place] = pool[best]
+        chosen[k] = pool[best]
         if scores is not None:
-            scores[place] = gain[best]
+            scores[k] = gain[best]
         for response, spread in enumerate(scale):
             if variance[response, best] <= SETTLED * spread**2:
                 continue
@@ -380,18 +381,18 @@ def tail_batch(
 
 
 CRITERIA = {"taylor": taylor_batch, "tail": tail_batch}
-"""Criteria by the name they have in a configuration."""
+"""Criteria by their names in a configuration."""
 
 
 def _quantiles(values: FloatArray, weight: FloatArray, beyond: FloatArray) -> FloatArray:
-    """Weighted quantile (level, response) of each response; infinite where none may lie beyond."""
+    """Weighted quantile (level, response); infinite where no point may lie beyond."""
     rounding = 1e-6 / values.shape[0]  # of the sums, far below one point's share
     found = [weighted_quantile(one, weight, beyond, rounding) for one in values.T]
     return np.where(beyond[:, None] >= 0.0, np.column_stack(found), np.inf)
 
 
 def _nodes(excess: FloatArray, deviation: FloatArray, spread: float, held: FloatArray) -> IntArray:
-    """Candidates (node,) that stand for the neighbourhood of a limit, by systematic sampling."""
+    """Candidates (node,) that represent the neighbourhood of a limit, by systematic sampling."""
     width = np.hypot(deviation, BAND * spread)
     weight = held * np.exp(-0.5 * (excess / width) ** 2) / width
     share = np.cumsum(weight)

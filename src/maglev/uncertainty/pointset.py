@@ -27,7 +27,7 @@ _CHUNK = 2**16  # counting points held in memory at once, assumed
 
 @dataclass(frozen=True)
 class PointSet:
-    """Points of the random inputs and the probability each of them stands for.
+    """Points of the random inputs and the probability that each represents.
 
     Attributes
     ----------
@@ -63,9 +63,9 @@ def gf_points(
 ) -> PointSet:
     """GF-discrepancy point set: scrambled Sobol' points, rearranged twice.
 
-    First rearranged with equal weights, then with the probabilities of the Voronoi cells, counted
-    once between the two and not again (a second count would spoil the moments).  The discrepancy
-    of the result is half the largest assigned probability.
+    The points are rearranged with equal weights, then with the probabilities of their Voronoi
+    cells, which are counted once in between (a second count would spoil the moments).  The
+    discrepancy of the result is half the largest assigned probability.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def gf_points(
 def sobol_points(marginals: Marginals, n: int, rng: np.random.Generator) -> PointSet:
     """One-stage set of scrambled Sobol' points of equal weight.
 
-    The first ``n`` points of the sequence; a power of two is balanced, other sizes are not.
+    They are the first ``n`` points of the sequence; only powers of two are balanced.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def rearranged(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Margina
     """Points shifted, input by input and in order, to the quantiles of their weights.
 
     ``x_qi <- F_i^-1( sum_k w_k I{x_ki < x_qi} + w_q / 2 )``, after which the GF-discrepancy is
-    half the largest weight.  Doing it again with the same weights changes nothing.
+    half the largest weight.  A second rearrangement with the same weights changes nothing.
 
     Parameters
     ----------

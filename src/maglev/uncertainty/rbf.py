@@ -25,14 +25,14 @@ BASES = {
 SHAPED = ("multiquadric", "gaussian")
 
 LARGEST_CONDITION = 1e14
-"""Largest condition number of the saddle matrix that is accepted [-]; assumed: about 1/100 of
-what leaves no correct digit in double precision."""
+"""Largest accepted condition number of the saddle matrix [-]; assumed: a hundredth of that which
+leaves no correct digit in double precision."""
 
 SHAPE_RANGE = (1e-2, 1e1)
-"""Shape parameters that are tried, in 1/(typical distance between neighbours) [-]; assumed."""
+"""Range of shape parameters, in 1/(typical distance between neighbours) [-]; assumed."""
 
 LENGTH_RANGE = (0.1, 10.0)
-"""Lengths that are tried, over those the search starts from [-]; assumed."""
+"""Range of lengths, over those at the start of the search [-]; assumed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -223,7 +223,7 @@ def fit_rbf(
     ------
     UserError
         If the training data cannot be used (``checked_training``), the basis is unknown, shape or
-        length are not positive or not wanted, or the saddle matrix is singular or its condition
+        length are not positive or not applicable, or the saddle matrix is singular or its condition
         number exceeds ``LARGEST_CONDITION``.
 
     References
@@ -321,7 +321,7 @@ def _saddle_matrix(
 ) -> tuple[FloatArray, float]:
     """Saddle matrix (sample + 1 + parameter, same), Φ scaled by its largest entry, and that entry.
 
-    The unit in which r³ is measured then says nothing about the condition number.
+    The scaling makes the condition number independent of the unit of r³.
     """
     n, s = points.shape
     matrix = np.zeros((n + 1 + s, n + 1 + s))

@@ -25,15 +25,15 @@ FAILURE_PROBABILITIES = (1e-1, 1e-2, 1e-3)
 """Levels at which limits are given by default."""
 
 CARRIED = 10
-"""Expected exceedances, to the nearest whole number, that a sample needs to carry a level; fewer
-and no number is given."""
+"""Expected exceedances, to the nearest whole number, that a sample needs at a level; with fewer, no
+limit is given."""
 
 _ROUNDING = 1e-12  # of a sum of probabilities, so that 1000 samples carry exactly one at 1e-3
 
 
 CLUSTERS_BEYOND = 3.0
-"""Expected clusters, such as tracks, at a level that they need to carry it; assumed: 32 tracks then
-carry 0.1.  The coverage is counted in a test."""
+"""Expected number of clusters, such as tracks, that a limit needs beyond it; assumed: 32 tracks
+then carry the level 0.1.  The coverage is counted in a test."""
 
 
 @dataclass(frozen=True)
@@ -48,11 +48,11 @@ class Limits:
         Limits [unit of the value]; NaN where ``status`` is not ``"given"``.
     lower, upper : (level,) or None
         Ends of the interval [unit]; infinite where the sample does not bound that side, NaN
-        where ``limit`` is, None where no interval can be had.
+        where ``limit`` is NaN, None where there is no interval.
     expected_exceedances : (level,)
         Number of held samples expected beyond the limit [-].
     status : (level,)
-        A word of `maglev.vocabulary.LIMIT_STATUS`: too few are less than ten expected exceedances.
+        A word of `maglev.vocabulary.LIMIT_STATUS`; fewer than ten expected exceedances are too few.
     confidence
         Confidence of the interval [-]; None with no interval.
     """
@@ -98,7 +98,7 @@ def exceedance(
 
     Parameters
     ----------
-    at : (place,)
+    at : (value,)
         Values y [unit of the extreme value].
     values : (sample,)
         Extreme values of the held samples [their unit].
@@ -109,13 +109,13 @@ def exceedance(
 
     Returns
     -------
-    exceedance : (place,)
+    exceedance : (value,)
         P(Y > y or lost) [-].
 
     Raises
     ------
     UserError
-        If the sample is faulty, a place is NaN or ``lost_probability`` lies outside [0, 1).
+        If the sample is faulty, a value y is NaN or ``lost_probability`` lies outside [0, 1).
 
     References
     ----------
@@ -128,7 +128,7 @@ def exceedance(
     """
     values, probability = weighted_sample(values, probability)
     check_lost_probability(lost_probability)
-    at = _checked_places(at)
+    at = _checked_values(at)
     ordered, beyond = weight_beyond(values, probability)
     held = beyond[np.searchsorted(ordered, at, side="right")]
     return lost_probability + (1.0 - lost_probability) * held
@@ -233,8 +233,8 @@ def surrogate_limits(
     failure_probability : (level,)
         Failure probabilities [-].
     residuals : (training,), optional
-        Leave-one-out residuals, computed value less prediction [unit]; those of the training
-        points near the tail alone, where errors differ across the domain.
+        Leave-one-out residuals, computed value less prediction [unit]; where errors differ
+        across the domain, only those of training points near the tail.
     standard_deviation : (sample,), optional
         Posterior deviation of each prediction [unit].
     error_range : optional
@@ -322,10 +322,10 @@ def surrogate_limits(
     def end(shift: float | FloatArray, loss: float, side: int) -> FloatArray:
         level = (levels - loss) / (1.0 - loss)
         padded = np.concatenate(([-np.inf], np.sort(predictions + shift), [np.inf]))
-        place = np.full(levels.shape, n + 1)  # no finite end where losses alone exceed the level
+        rank = np.full(levels.shape, n + 1)  # no finite end where losses alone exceed the level
         finite = level > 0.0
-        place[finite] = _order_statistics(n, 1.0 - level[finite], confidence)[side]
-        return np.where(given, padded[place], np.nan)
+        rank[finite] = _order_statistics(n, 1.0 - level[finite], confidence)[side]
+        return np.where(given, padded[rank], np.nan)
 
     return Limits(
         failure_probability=levels,
@@ -346,10 +346,10 @@ def clustered_limits(
 ) -> Limits:
     """Limits of samples that come in equally likely clusters, such as the gains on some tracks.
 
-    The limit is that of all samples together.  How far it is known is decided by the number of
-    clusters: the exceedance at the limit is a mean over clusters with its own effective size, which
-    gives the exact binomial interval of the exceedance, and the limits at its ends are those of the
-    limit.
+    The limit is that of all samples together.  Its interval depends on the number of clusters: the
+    exceedance at the limit is a mean over clusters with an effective size of its own.  From it
+    follows the exact binomial interval of the exceedance; the limits at the ends of that interval
+    are the ends of the interval of the limit.
 
     Parameters
     ----------
@@ -363,8 +363,8 @@ def clustered_limits(
     Returns
     -------
     limits
-        One limit per level; ``expected_exceedances`` counts clusters.  Too few are less than
-        `CLUSTERS_BEYOND` of them.
+        One limit per level; ``expected_exceedances`` counts clusters, of which at least
+        `CLUSTERS_BEYOND` are needed.
 
     Raises
     ------
@@ -398,7 +398,7 @@ def clustered_limits(
     carried = n * levels >= CLUSTERS_BEYOND
 
     def at(level: float) -> float:
-        """The smallest value that at most a share of all samples exceeds."""
+        """Smallest value that at most a given share of all samples exceeds."""
         allowed = int(ranked.size * level * (1.0 + _ROUNDING))
         return float(ranked[max(ranked.size - allowed - 1, 0)])
 
@@ -437,13 +437,13 @@ def error_range_near(
 ) -> tuple[FloatArray, FloatArray]:
     """Range of a surrogate's error where its response is near given values.
 
-    As many training samples as the confidence takes, those whose values are nearest, give their
-    smallest and largest leave-one-out residual.  With fewer samples than that in all, residuals
-    are taken as normal: Student's interval of one more of them.
+    The range is that of the leave-one-out residuals of the training samples with the nearest
+    values, the fewest that the confidence needs.  With fewer samples in all, the range is Student's
+    prediction interval of a further residual, residuals taken as normal.
 
     Parameters
     ----------
-    at : (place,)
+    at : (value,)
         Values near which the error is wanted, such as limits [unit of the value].
     values : (training,)
         Training values [unit].
@@ -454,7 +454,7 @@ def error_range_near(
 
     Returns
     -------
-    low, high : (place,)
+    low, high : (value,)
         Ends of the range [unit].
 
     Raises
@@ -475,7 +475,7 @@ def error_range_near(
     >>> bool(-0.01 <= low[0] < high[0] <= 0.01)
     True
     """
-    at = _checked_places(at)
+    at = _checked_values(at)
     values, residuals = np.asarray(values, dtype=float), np.asarray(residuals, dtype=float)
     _check_confidence(confidence)
     n = values.size
@@ -578,10 +578,10 @@ def _checked_levels(failure_probability: npt.ArrayLike) -> FloatArray:
     return levels
 
 
-def _checked_places(at: npt.ArrayLike) -> FloatArray:
+def _checked_values(at: npt.ArrayLike) -> FloatArray:
     at = np.atleast_1d(np.asarray(at, dtype=float))
     if at.ndim != 1 or np.any(np.isnan(at)):
-        raise UserError(f"places must have shape (place,) and not be NaN, got shape {at.shape}")
+        raise UserError(f"values y must have shape (value,) and not be NaN, got shape {at.shape}")
     return at
 
 

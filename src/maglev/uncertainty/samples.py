@@ -12,7 +12,8 @@ from maglev.arrays import FloatArray
 from maglev.errors import UserError
 
 SUM_TOLERANCE = 1e-9
-"""How far probabilities may sum from one: far above rounding, far below one point's. Assumed."""
+"""Largest distance of a sum of probabilities from one, far above rounding and far below the
+probability of one point; assumed."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ def deviation_interval(
 ) -> tuple[float, float, float]:
     """Standard deviation of independent values that need not be normal, with its interval.
 
-    The interval of the logarithm, with the kurtosis about a trimmed mean.
+    The interval is that of the logarithm, with the kurtosis about a trimmed mean.
 
     Parameters
     ----------
@@ -202,7 +203,7 @@ def held_part(
     Parameters
     ----------
     values : (sample,)
-        Extreme values [their unit]; anything, NaN too, where ``lost``.
+        Extreme values [their unit]; any value, also NaN, where ``lost``.
     lost : (sample,)
         True where the sample is lost.
     probability : (sample,), optional
@@ -321,7 +322,7 @@ def weighted_quantile(
     beyond : (level,)
         Weights that may lie beyond [-]; below zero, the largest value is given.
     rounding
-        Error of a sum of weights that is forgiven [-], far below one weight.
+        Tolerated error of a sum of weights [-], far below one weight.
 
     Returns
     -------
@@ -335,5 +336,5 @@ def weighted_quantile(
     """
     ordered, left = weight_beyond(np.asarray(values, float), np.asarray(weight, float))
     # left[k + 1] lies beyond the k-th smallest value and does not grow with k
-    place = np.searchsorted(-left[1:], -(np.asarray(beyond, float) + rounding), side="left")
-    return ordered[np.minimum(place, ordered.size - 1)]
+    index = np.searchsorted(-left[1:], -(np.asarray(beyond, float) + rounding), side="left")
+    return ordered[np.minimum(index, ordered.size - 1)]

@@ -1,7 +1,7 @@
-"""One surrogate for each response: the one named, or the best of all by leave-one-out.
+"""One surrogate for each response: a named kind, or the best of all by leave-one-out.
 
-The kinds found and their few parameters are all that a file needs to hold: with the training data
-they make the same surrogate again, without a search.
+A file need hold only the kinds and their few parameters: with the training data they give the same
+surrogate again, without a search.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from maglev.uncertainty.surrogate import best_by_leave_one_out, checked_training
 from maglev.vocabulary import SURROGATES
 
 CHOICES = (*SURROGATES, "best")
-"""What can be asked for: one kind for all responses, or the best of all for each."""
+"""Choices of a surrogate: one kind for all responses, or the best kind for each."""
 
 _FITS: dict[str, Callable[[FloatArray, FloatArray], RBF | ScaledRBF | Kriging]] = {
     "rbf": fit_rbf,
@@ -162,7 +162,7 @@ def rebuilt(
     Returns
     -------
     surrogate
-        The same numbers as the surrogate they were taken from.
+        The original surrogate, number for number.
 
     Raises
     ------

@@ -23,8 +23,8 @@ class Shares:
     Parameters
     ----------
     first, second, interaction : (3,)
-        What the first group alone, the second alone and both together contribute: share, lower
-        and upper end [-].  The three shares sum to one; a noisy one may be below zero.
+        Contribution of the first group alone, of the second alone and of both together: share,
+        lower and upper end [-].  The shares sum to one; by noise, one may be below zero.
     """
 
     first: FloatArray
@@ -124,12 +124,12 @@ def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
 
     The two-way analysis of variance with random effects: with the mean squares of n_a first and
     n_b second inputs, ``s_ab = M_ab``, ``s_a = (M_a - M_ab) / n_b``, ``s_b = (M_b - M_ab) / n_a``.
-    Runs have no noise, so that what neither input explains alone is what they do together.
+    Runs have no noise, so the remainder that neither input explains alone is their interaction.
 
-    The intervals are those of the jackknife over either kind of input, their variances added, with
-    Student's quantile of the second inputs, of which there are few: of the logit of a share, or of
-    the share itself where leaving one out takes it out of (0, 1).  A bootstrap would draw an input
-    twice, and twins do nothing together.
+    The intervals are those of the jackknife over either kind of input: variances are added, and
+    Student's quantile is that of the second inputs, the fewer ones.  They hold for the logit of a
+    share, or for the share itself where leaving one input out takes it out of (0, 1).  A bootstrap
+    would draw inputs twice, and equal inputs have no interaction.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def crossed_shares(values: npt.ArrayLike, confidence: float = 0.95) -> Shares:
 
 
 def _logit_where(inside: BoolArray, shares: FloatArray) -> FloatArray:
-    """The logit of some shares (…, share), the others as they are."""
+    """Logit of the chosen shares (…, share); the others unchanged."""
     safe = np.where(inside, shares, 0.5)
     return np.where(inside, np.log(safe / (1.0 - safe)), shares)
 

@@ -18,9 +18,9 @@ def sobol_indices(
 ) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
     """First-order and total Sobol' indices of a surrogate with intervals.
 
-    They are those over all of the input density, its predictions kept within the values of the
-    training samples: beyond them it would extrapolate.  The intervals are those of ``N_SETS``
-    independent scramblings and do not know the surrogate's own error.
+    Predictions over the whole input density are clipped to the range of the training values, beyond
+    which the surrogate extrapolates.  The intervals come from ``N_SETS`` independent scramblings
+    and do not contain the surrogate's own error.
 
     Parameters
     ----------
