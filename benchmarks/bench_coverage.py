@@ -12,6 +12,7 @@ and method is one file in ``benchmarks/results/coverage``; docs/benchmarks/cover
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 from pathlib import Path
@@ -172,10 +173,17 @@ def designs(name: str, seed: int) -> dict[str, check.Runs]:
             "tail": adaptive(known, name, seed, 0),
             "explored": adaptive(known, name, seed, N_BATCH // 2),
         }
-        STORE.mkdir(parents=True, exist_ok=True)
-        np.savez(path, **{key: one.points for key, one in runs.items()})
+        keep(path, **{key: one.points for key, one in runs.items()})
     with np.load(path) as kept:
         return {key: made(known, kept[key]) for key in ("one_stage", "tail", "explored")}
+
+
+def keep(path: Path, **arrays: Array) -> None:
+    """Write arrays so that the file appears whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    aside = path.with_name(f"{os.getpid()}_{path.name}")
+    np.savez(aside, **arrays)
+    aside.replace(path)
 
 
 def found(name: str, seed: int, method: str) -> dict[str, Array]:
@@ -189,7 +197,7 @@ def found(name: str, seed: int, method: str) -> dict[str, Array]:
             key = "explored" if method == "joint" else method
             rng = generator(name, seed, method)
             limits, lost = by_surrogate(made_by[key], rng, method == "joint")
-        np.savez(path, limits=limits, lost=lost)
+        keep(path, limits=limits, lost=lost)
         print(f"{name}, seed {seed}, {method}: {time.perf_counter() - start:.1f} s", flush=True)
     with np.load(path) as kept:
         return dict(kept)
