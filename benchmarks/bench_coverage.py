@@ -52,6 +52,9 @@ METHODS = {
     "checked": "checked by 196 more runs (now)",
 }
 
+TITLES = {"one_stage": "one stage", "tail": "by the tail", "joint": "joint", "checked": "checked"}
+"""The same in a figure."""
+
 Array = np.ndarray
 
 
@@ -293,6 +296,10 @@ def page(n_seeds: int) -> str:
         lines.append(f"| {METHODS[method]} | {shares} |")
     lines += ["", "## Probability of loss", "", *lost_lines(n_seeds), ""]
     lines += [f"![coverage and half width]({PAGE.with_suffix('.png').name})", ""]
+    lines += [
+        "A point is a function and a level; at 1000 stand intervals without an upper end.",
+        "",
+    ]
     return "\n".join(lines)
 
 
@@ -321,7 +328,7 @@ def draw(n_seeds: int) -> None:
     """Figure: share that hold against half width over error, a point for each limit."""
     with style.page():
         figure, axes = style.panels(1, len(METHODS), style.PAGE, 2.4)
-        for axis, (method, words) in zip(np.ravel(axes), METHODS.items(), strict=True):
+        for axis, (method, words) in zip(np.ravel(axes), TITLES.items(), strict=True):
             for k, level in enumerate(LEVELS):
                 scores = [
                     Score(name, method, k, stored_seeds(name, n_seeds)[method]) for name in KNOWN
