@@ -116,16 +116,13 @@ DRAWN = {
     "fig_track_split": (
         "track_split",
         "what random gains and a random track contribute",
-        [file_of("track_split", case=case) for case in TRACK_CASES[:1]],
+        of_first_split(),
     ),
-    **{
-        f"fig_in_time{f'_{case}' if k else ''}": (
-            "in_time",
-            f"densities over the time of a passage of '{case}'",
-            [file_of("density_in_time", case=case)],
-        )
-        for k, case in enumerate(followed_cases())
-    },
+    "fig_in_time": (
+        "in_time",
+        "densities over the time of a passage",
+        [file_of("density_in_time", case=case) for case in followed_cases()[:1]],
+    ),
 }
 
 
@@ -180,6 +177,8 @@ for figure, (module, words, files) in DRAWN.items():
 
 # all figures of a case in one job, whichever of them is asked for: most of its time is spent once
 for case in parameters.cases:
+    if not figures_of_case(case):
+        continue
 
     rule:
         name:
