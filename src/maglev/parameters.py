@@ -2052,6 +2052,33 @@ class Config(Parameters):
         extra = field.json_schema_extra
         return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
+    def swept_number(self, key: str, value: Any) -> tuple[float, str]:
+        """Number in SI, and its unit, that a value of a swept key stands for.
+
+        Parameters
+        ----------
+        key
+            Dotted key.
+        value
+            As a file writes it.
+
+        Returns
+        -------
+        number, unit
+            NaN and an empty text for a value that is no number, such as the group of a circuit.
+
+        Examples
+        --------
+        >>> Config().swept_number("passage.speed", "360 km/h")
+        (100.0, 'm/s')
+        """
+        first, *keys = key.split(".")
+        field, number = _field_at(_with_value(getattr(self, first), keys, value), keys)
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            return math.nan, ""
+        extra = field.json_schema_extra
+        return float(number), str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
     def value_of(self, key: str) -> float:
         """Number at a dotted key, in SI."""
         return float(_field_at(self, key.split("."))[1])
