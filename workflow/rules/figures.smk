@@ -126,28 +126,6 @@ DRAWN = {
 }
 
 
-def drawn_from(case: str):
-    """Function that finds the files of every figure of a case, by its name."""
-
-    def found(wildcards) -> dict[str, list[str]]:
-        return {name: files for name, (_, files) in figures_of_case(case).items()}
-
-    return found
-
-
-def words_of(case: str):
-    """Function that writes what `maglev figures` is given for all figures of a case."""
-
-    def written(wildcards, input, output) -> str:
-        folder = Path(output[0]).parent
-        return " + ".join(
-            " ".join([module, str(folder / name), *input[name]])
-            for name, (module, _) in figures_of_case(case).items()
-        )
-
-    return written
-
-
 for figure, (module, words, files) in DRAWN.items():
     if not files:
         continue

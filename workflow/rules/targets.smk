@@ -159,3 +159,25 @@ def figures_of_study() -> list[str]:
         f"{case}/{name}" for case in parameters.cases for name in figures_of_case(case)
     ]
     return [f"<results>/figures/{name}.png" for name in (*of_paper, *of_cases)]
+
+
+def drawn_from(case: str):
+    """Function that finds the files of every figure of a case, by its name."""
+
+    def found(wildcards) -> dict[str, list[str]]:
+        return {name: files for name, (_, files) in figures_of_case(case).items()}
+
+    return found
+
+
+def words_of(case: str):
+    """Function that writes what `maglev figures` is given for all figures of a case."""
+
+    def written(wildcards, input, output) -> str:
+        folder = Path(output[0]).parent
+        return " + ".join(
+            " ".join([module, str(folder / name), *input[name]])
+            for name, (module, _) in figures_of_case(case).items()
+        )
+
+    return written
