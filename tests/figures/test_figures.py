@@ -28,6 +28,7 @@ def tiny(layout):
     """A plausible small dataset of a layout."""
     rng = np.random.default_rng(1)
     names = [*LAYOUTS[layout].variables, *LAYOUTS[layout].optional]
+    names = [name for name in names if "parameter" not in VARIABLES[name].dims]
     dims = {dim for name in names for dim in VARIABLES[name].dims}
     coords = {dim: np.arange(1.0, 1 + SIZES[dim]) for dim in sorted(dims)}
     if "side" in dims:

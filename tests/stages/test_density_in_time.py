@@ -13,7 +13,7 @@ from maglev.config import from_mapping
 from maglev.stage import named
 from maglev.stages import density_in_time, histories, representative_points, runs
 from maglev.uncertainty.in_time import thinned
-from maglev.vocabulary import BARRIER_SOURCES, RESPONSES, STEP_TOO_LARGE
+from maglev.vocabulary import BARRIER_SOURCES, PAPER_RESPONSES, STEP_TOO_LARGE
 
 TIME = 1e-3 * np.arange(1, 1501)
 PERIOD = 0.5
@@ -37,7 +37,7 @@ class FormulaHistories:
         lost = made["status"].to_numpy() != 0
         made["status"] = ("sample", np.where(lost, self.status, 0))
         made["lost_t"] = ("sample", np.where(lost, 0.7, np.nan))
-        for k, name in enumerate(RESPONSES):
+        for k, name in enumerate(PAPER_RESPONSES):
             extreme = synthetic.extremes(standard)[:, k]
             swing = np.sin(2 * np.pi / PERIOD * TIME)
             swing = -(swing**2) if name == "girder_acceleration_y" else swing
@@ -79,7 +79,7 @@ def limits(given=True):
     by_level = ("response", "failure_probability")
     return xr.Dataset(
         {"limit": (by_level, limit), "limit_status": (by_level, status)},
-        coords={"response": list(RESPONSES), "failure_probability": list(LEVELS)},
+        coords={"response": list(PAPER_RESPONSES), "failure_probability": list(LEVELS)},
     )
 
 
@@ -213,7 +213,7 @@ def test_a_path_of_the_model_reaches_its_extreme():
         passages, whole[list(passages.data_vars)].drop_vars("magnet", errors="ignore")
     )
     ends = np.linspace(0, passages.sizes["t"], 40).astype(int)
-    for name in RESPONSES:
+    for name in PAPER_RESPONSES:
         path = histories._path(passages, name, ends)
         assert_allclose(np.abs(path).max(axis=1), passages[name], rtol=1e-12, err_msg=name)
         interval = -(-np.abs(path).argmax(axis=1) // 3)

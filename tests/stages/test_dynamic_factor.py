@@ -25,7 +25,7 @@ class Simulated:
     def __init__(self, last=None):
         self.speeds, self.last = [], last
 
-    def __call__(self, config, gains, n_threads):
+    def __call__(self, config, gains, n_threads, **_):
         if self.last is not None and len(self.speeds) == self.last:
             raise KeyboardInterrupt
         self.speeds.append(config.passage.speed)
