@@ -257,9 +257,7 @@ def sample_values(path: str | Path) -> list[str | float]:
     heading = rows[0][0].strip() if rows else ""
     found = re.fullmatch(r"[^\[\]]*[^\W\d][^\[\]]*(\[(?P<unit>[^\[\]]+)\])?", heading)
     if found is None:
-        raise ConfigError(
-            f"{path}, line 1: expected a heading such as 'mass [t]', got '{heading}'"
-        )
+        raise ConfigError(f"{path}, line 1: expected a heading such as 'mass [t]', got '{heading}'")
     unit = (found["unit"] or "").strip()
     values: list[str | float] = []
     for number, row in enumerate(rows[1:], start=2):
