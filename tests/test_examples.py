@@ -20,6 +20,7 @@ FOR_USERS += [
     f"maglev.mechanics.{name}"
     for name in (
         "bodies",
+        "comfort",
         "control",
         "course",
         "guideway",

@@ -71,11 +71,63 @@ def test_histories_peak_at_the_extremes(with_histories):
     )
 
 
-def test_the_car_body_extreme_is_that_of_the_worst_car(with_histories):
-    for axis in "yz":
-        per_car = with_histories[f"car_body_acceleration_{axis}_per_car"]
-        assert_array_equal(with_histories[f"car_body_acceleration_{axis}"], per_car.max("car"))
+def test_a_response_of_cars_is_that_of_the_worst_car(with_histories):
+    for name in datasets.CAR_RESPONSES:
+        per_car = with_histories[f"{name}_per_car"]
+        assert_array_equal(with_histories[name], per_car.max("car"))
         assert np.all(per_car.std("car") > 0)
+
+
+def test_the_larger_of_both_signs_is_the_extreme(with_histories):
+    for name in datasets.SIGNED_RESPONSES:
+        parts = [with_histories[f"{name}_{part}"] for part in ("positive", "negative")]
+        assert_array_equal(np.maximum(*parts), with_histories[name])
+        history = with_histories[f"{name}_history"]
+        for sign, part in zip((1.0, -1.0), parts, strict=True):
+            largest = (sign * history).max("t")
+            assert_allclose(part, largest, atol=0.03 * float(with_histories[name].max()))
+            assert np.all(part >= largest * (1 - 1e-6))
+
+
+def test_the_ends_of_a_car_shake_more_than_its_middle_by_its_pitching_and_yawing(with_histories):
+    wide, narrow = with_histories, simulate(with_end_distance(1e-6), MEAN * [[1.0], [1.1]])
+    for axis in "yz":
+        middle = wide[f"car_body_acceleration_{axis}_per_car"]
+        assert np.all(wide[f"car_end_acceleration_{axis}_per_car"] > 1.02 * middle)
+        assert_allclose(narrow[f"car_end_acceleration_{axis}_per_car"], middle, rtol=1e-5)
+        for index in ("sperling_index", "iso2631_rms"):
+            name = f"{index}_{axis}_per_car"
+            assert np.all(wide[name] > narrow[name])
+
+
+def with_end_distance(distance):
+    config = small(2, 3)
+    body = config.train.car_body.model_copy(update={"end_distance": distance})
+    return config.model_copy(update={"train": config.train.model_copy(update={"car_body": body})})
+
+
+def test_a_slow_train_on_a_smooth_track_is_at_rest_everywhere():
+    smooth = {"enabled": False}
+    found = simulate(small(1, 3, smooth, speed="20 km/h"), MEAN[None]).isel(sample=0)
+    assert_allclose(found["dynamic_coefficient"], 1.0, rtol=3e-3)
+    span = small().guideway.span_length
+    assert_allclose(found["deflection_over_span"] * span, found["girder_displacement_z"])
+    assert_allclose(found["suspension_current_share"], 25 / 120, rtol=1e-2)
+    assert_allclose(found["guidance_current_share"], 25 / 120, rtol=1e-2)
+    assert found["suspension_gap_excursion"] < 2e-4
+    assert found["bearing_uplift"] < 1e-7
+    assert found["iso2631_rms_z"] < 2e-3
+    fast = simulate(small(1, 3, smooth), MEAN[None]).isel(sample=0)
+    assert fast["dynamic_coefficient"] > 1.01
+    assert fast["bearing_uplift"] > 2e-7
+
+
+def test_a_lost_sample_has_no_response():
+    found = simulate(small(), MEAN * [[1.0], [0.3]])
+    assert found["status"][0] == 0 and found["status"][1] != 0
+    for name in datasets.RESPONSES:
+        assert np.isfinite(found[name][0]), name
+        assert np.isnan(found[name][1]), name
 
 
 def test_histories_do_not_change_the_extremes(with_histories):
@@ -127,6 +179,7 @@ def test_any_number_of_cars_passes_any_number_of_spans(n_cars, n_spans):
     for name in datasets.RESPONSES:
         assert np.isfinite(passages[name]).all()
         assert passages[name] > 0
+    for name in datasets.TIMED_RESPONSES:
         assert 0 < passages[f"{name}_t"] <= course(config).n_steps * course(config).time_step
 
 

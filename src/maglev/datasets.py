@@ -24,19 +24,24 @@ from maglev.errors import UserError
 from maglev.fingerprint import file_hash
 from maglev.vocabulary import (
     BARRIER_SOURCES,
+    CAR_RESPONSES,
     DECISIONS,
     DENSITY_METHODS,
     GAIN_UNITS,
     GAINS,
     GROUPS,
     LIMIT_STATUS,
+    PAPER_RESPONSES,
+    RESPONSE_TABLE,
     RESPONSE_UNITS,
-    RESPONSE_WORDS,
     RESPONSES,
+    SIGNED_RESPONSES,
     SOURCES,
     STATUS,
     SURROGATES,
+    TIMED_RESPONSES,
     TRAIN_PARTS,
+    ResponseEntry,
 )
 
 CONVENTIONS = "CF-1.11"
@@ -180,23 +185,8 @@ def _model_table() -> dict[str, Variable]:
     }
     for name, unit in GAIN_UNITS.items():
         table[name] = _number("sample", unit, f"{name.replace('_', ' ')} of the magnets")
-    for name, meaning in RESPONSE_WORDS.items():
-        unit = RESPONSE_UNITS[name]
-        table[name] = _number("sample", unit, f"largest absolute {meaning}")
-        table[f"{name}_t"] = _number("sample", "s", f"time of the largest absolute {meaning}")
-        of_car = name.startswith("car_body")
-        table[f"{name}_history"] = _number(
-            "sample car t" if of_car else "sample t",
-            unit,
-            meaning.replace(", largest over the cars", ""),
-            "float32",
-        )
-        if of_car:
-            table[f"{name}_per_car"] = _number(
-                "sample car",
-                unit,
-                f"largest absolute {meaning.replace(', largest over the cars', '')}",
-            )
+    for name, entry in RESPONSE_TABLE.items():
+        table |= _response_variables(name, entry)
     for kind in ("suspension", "guidance"):
         for end, word in (("min", "smallest"), ("max", "largest")):
             table[f"{kind}_gap_{end}"] = _number("sample", "m", f"{word} gap of any {kind} pole")
@@ -288,6 +278,26 @@ def _model_table() -> dict[str, Variable]:
     table["measured_deflection"] = _number(
         "measured_speed", "m", "largest vertical deflection at midspan measured on the line"
     )
+    return table
+
+
+def _response_variables(name: str, entry: ResponseEntry) -> dict[str, Variable]:
+    """Variables of a response: its value, and what is kept beside it."""
+    of_one = entry.words.replace(", largest over the cars", "")
+    motion = of_one.removeprefix("largest absolute ")
+    table = {name: _number("sample", entry.unit, entry.words)}
+    if entry.timed:
+        table[f"{name}_t"] = _number("sample", "s", f"time of the {entry.words}")
+    if entry.kind == "car":
+        table[f"{name}_per_car"] = _number("sample car", entry.unit, of_one)
+    if name in PAPER_RESPONSES:
+        dims = "sample car t" if entry.kind == "car" else "sample t"
+        table[f"{name}_history"] = _number(dims, entry.unit, motion, "float32")
+    if name in SIGNED_RESPONSES:
+        side = "downwards" if name.endswith("_z") else "to the right"
+        other = "upwards" if name.endswith("_z") else "to the left"
+        table[f"{name}_positive"] = _number("sample", entry.unit, f"largest {motion}, {side}")
+        table[f"{name}_negative"] = _number("sample", entry.unit, f"largest {motion}, {other}")
     return table
 
 
@@ -885,9 +895,9 @@ class Layout:
 _EXTREMES = (
     *GAINS,
     *RESPONSES,
-    *(f"{name}_t" for name in RESPONSES),
-    "car_body_acceleration_z_per_car",
-    "car_body_acceleration_y_per_car",
+    *(f"{name}_t" for name in TIMED_RESPONSES),
+    *(f"{name}_per_car" for name in CAR_RESPONSES),
+    *(f"{name}_{part}" for name in SIGNED_RESPONSES for part in ("positive", "negative")),
     "suspension_gap_min",
     "suspension_gap_max",
     "guidance_gap_min",
@@ -899,7 +909,7 @@ _EXTREMES = (
     "lost_magnet",
 )
 _HISTORIES = (
-    *(f"{name}_history" for name in RESPONSES),
+    *(f"{name}_history" for name in PAPER_RESPONSES),
     "gap_history",
     "current_history",
     "magnet_kind",
@@ -1277,7 +1287,7 @@ def _units_of_rows(dataset: xr.Dataset) -> dict[str, list[str]]:
     """Unit of each response and of each limit state of a dataset, by dimension."""
     names = {"response": "response", "limit_state": "state_response"}
     return {
-        dim: [str(RESPONSE_UNITS.get(str(one), "1")) for one in dataset[name].to_numpy()]  # type: ignore[call-overload]
+        dim: [str(RESPONSE_UNITS.get(str(one), "1")) for one in dataset[name].to_numpy()]
         for dim, name in names.items()
         if name in dataset.variables
     }

@@ -203,6 +203,15 @@ class CarBody(Parameters):
     height: float = quantity(
         "m", "centre of mass above the deck level", 1.5, source="M", confidence="L"
     )
+    end_distance: float | None = quantity(
+        "m",
+        "distance of the floor's ends from the centre, where accelerations are watched; "
+        "null: half the car pitch",
+        None,
+        source="A",
+        confidence="L",
+        above=0,
+    )
 
 
 class Bogie(Parameters):
@@ -432,6 +441,12 @@ class Train(Parameters):
     def length(self) -> float:
         """Length of the train from nose to tail [m]."""
         return self.n_cars * self.car_pitch
+
+    @property
+    def end_distance(self) -> float:
+        """Distance of the ends of a car body's floor from its centre [m]."""
+        given = self.car_body.end_distance
+        return 0.5 * self.car_pitch if given is None else given
 
 
 class BeamSection(Parameters):
@@ -1252,7 +1267,7 @@ ONCE_A_YEAR = 2.74e-5
 
 def _limit_states() -> dict[str, LimitState]:
     """The limit states that are shipped: those whose response there is."""
-    once = f"; target: once a year with 36,500 trains, assumed ({ONCE_A_YEAR:g} a passage)"
+    once = "; target: once a year with 36,500 trains, assumed"
     shipped: tuple[tuple[str, str, str | float, str, str], ...] = (
         (
             "suspension gap",

@@ -27,6 +27,7 @@ from maglev.mechanics.responses import (
     Passages,
     checked_gains,
     in_their_order,
+    responses,
 )
 from maglev.mechanics.varied import checked_values, cost_of, equal_samples
 from maglev.parameters import Config
@@ -81,14 +82,15 @@ def simulate(
     Returns
     -------
     passages
-        Layout ``passage`` of `maglev.datasets`: on ``sample`` the extremes of the six responses
-        [m, m s-2] and their times [s], gaps [m], currents [A], ``status`` and where and when
-        levitation was lost; with ``histories`` also the time series on ``t``.  The extremes of a
-        lost sample are NaN, as are those of a sample whose gains ask for a smaller step, which is
-        not judged (status ``step_too_large``).  Attributes ``time_step`` [s], ``n_steps``, both
-        the largest of any sample, and ``track``, the words for the track that the numbers are of;
-        of the reference solver also
-        ``estimated_error``, the largest of any extreme as a share of it, and ``seconds``.
+        Layout ``passage`` of `maglev.datasets`: on ``sample`` the responses of
+        `maglev.vocabulary.RESPONSE_TABLE` and the times of those that have one [s], gaps [m],
+        currents [A], ``status`` and where and when levitation was lost; with ``histories`` also the
+        time series on ``t``.  The responses of a lost sample are NaN, as are those of a sample
+        whose gains ask for a smaller step, which is not judged (status ``step_too_large``).
+        Attributes ``time_step`` [s], ``n_steps``, both the largest of any sample, and ``track``,
+        the words for the track that the numbers are of; of the reference solver also
+        ``estimated_error``, the largest of the six responses of the paper as a share of it, and
+        ``seconds``.
 
     Raises
     ------
@@ -319,19 +321,9 @@ def _dataset(
     variables: dict[str, tuple[tuple[str, ...], npt.NDArray]] = {
         name: (one, gains[:, k]) for k, name in enumerate(datasets.GAINS)
     }
-    for k, name in enumerate(GIRDER_RESPONSES):
-        variables[name] = (one, passages.girder[:, k])
-        variables[f"{name}_t"] = (one, passages.girder_time[:, k])
-    cars = np.arange(passages.body_z.shape[1])
-    for axis, extreme, when in (
-        ("z", passages.body_z, passages.body_z_time),
-        ("y", passages.body_y, passages.body_y_time),
-    ):
-        name = f"car_body_acceleration_{axis}"
-        worst = np.where(np.isnan(extreme), -1.0, extreme).argmax(axis=1)[:, None]
-        variables[name] = (one, np.take_along_axis(extreme, worst, axis=1)[:, 0])
-        variables[f"{name}_t"] = (one, np.take_along_axis(when, worst, axis=1)[:, 0])
-        variables[f"{name}_per_car"] = (("sample", "car"), extreme)
+    for name, found in responses(passages).items():
+        for part, values in found.parts.items():
+            variables[f"{name}{part}"] = (one if values.ndim == 1 else ("sample", "car"), values)
     for k, kind in enumerate(("suspension", "guidance")):
         variables[f"{kind}_gap_min"] = (one, passages.gap_min[:, k])
         variables[f"{kind}_gap_max"] = (one, passages.gap_max[:, k])
@@ -339,7 +331,10 @@ def _dataset(
     variables["status"] = (one, passages.status)
     variables["lost_t"] = (one, passages.lost_time)
     variables["lost_magnet"] = (one, passages.lost_magnet)
-    coordinates: dict[str, npt.NDArray] = {"sample": np.arange(gains.shape[0]), "car": cars}
+    coordinates: dict[str, npt.NDArray] = {
+        "sample": np.arange(gains.shape[0]),
+        "car": np.arange(passages.body_z.shape[1]),
+    }
     if histories:
         for k, name in enumerate(GIRDER_RESPONSES):
             variables[f"{name}_history"] = (("sample", "t"), passages.girder_history[:, k])

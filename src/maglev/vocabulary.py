@@ -7,30 +7,20 @@ and its order is the same everywhere.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias, get_args
 
-Response = Literal[
-    "girder_displacement_z",
-    "girder_displacement_y",
-    "girder_acceleration_z",
-    "girder_acceleration_y",
-    "car_body_acceleration_z",
-    "car_body_acceleration_y",
-]
-"""A response; its extreme is the result of a passage."""
+Kind = Literal["girder", "car", "magnet", "bearing"]
+"""What a response is of."""
 
-RESPONSES: tuple[Response, ...] = get_args(Response)
-"""The responses in the order in which they are shown."""
 
-PAPER_RESPONSES: tuple[Response, ...] = (
-    "girder_displacement_z",
-    "girder_displacement_y",
-    "girder_acceleration_z",
-    "girder_acceleration_y",
-    "car_body_acceleration_z",
-    "car_body_acceleration_y",
-)
-"""The responses that the paper judges a passage by."""
+class ResponseEntry(NamedTuple):
+    """What is said of a response wherever it is named."""
+
+    unit: str  # in the notation of UDUNITS
+    words: str  # meaning of the value
+    kind: Kind  # those of a car are the largest over the cars, and are kept for each
+    timed: bool = True  # whether the value is of one moment, which is kept
+
 
 RecordedResponse = Literal[
     "girder_displacement_z",
@@ -44,18 +34,115 @@ RecordedResponse = Literal[
 
 _GIRDER = "of the girder at midspan of the middle span"
 _CAR = "of the car body, largest over the cars"
-RESPONSE_WORDS: Mapping[Response, str] = {
-    "girder_displacement_z": f"vertical displacement {_GIRDER}",
-    "girder_displacement_y": f"lateral displacement {_GIRDER}",
-    "girder_acceleration_z": f"vertical acceleration {_GIRDER}",
-    "girder_acceleration_y": f"lateral acceleration {_GIRDER}",
-    "car_body_acceleration_z": f"vertical acceleration {_CAR}",
-    "car_body_acceleration_y": f"lateral acceleration {_CAR}",
+_END = "at the ends of the car body's floor, largest over the cars"
+_POLE = "from its reference, of any pole"
+_SHARE = "as a share of the largest that the chopper gives"
+RESPONSE_TABLE: Mapping[str, ResponseEntry] = {
+    "girder_displacement_z": ResponseEntry(
+        "m", f"largest absolute vertical displacement {_GIRDER}", "girder"
+    ),
+    "girder_displacement_y": ResponseEntry(
+        "m", f"largest absolute lateral displacement {_GIRDER}", "girder"
+    ),
+    "girder_acceleration_z": ResponseEntry(
+        "m s-2", f"largest absolute vertical acceleration {_GIRDER}", "girder"
+    ),
+    "girder_acceleration_y": ResponseEntry(
+        "m s-2", f"largest absolute lateral acceleration {_GIRDER}", "girder"
+    ),
+    "car_body_acceleration_z": ResponseEntry(
+        "m s-2", f"largest absolute vertical acceleration {_CAR}", "car"
+    ),
+    "car_body_acceleration_y": ResponseEntry(
+        "m s-2", f"largest absolute lateral acceleration {_CAR}", "car"
+    ),
+    "suspension_gap_excursion": ResponseEntry(
+        "m", f"largest absolute excursion of the suspension gap {_POLE}", "magnet", timed=False
+    ),
+    "guidance_gap_excursion": ResponseEntry(
+        "m", f"largest absolute excursion of the guidance gap {_POLE}", "magnet", timed=False
+    ),
+    "suspension_current_share": ResponseEntry(
+        "1", f"largest current of any suspension magnet {_SHARE}", "magnet", timed=False
+    ),
+    "guidance_current_share": ResponseEntry(
+        "1", f"largest current of any guidance magnet {_SHARE}", "magnet", timed=False
+    ),
+    "car_end_acceleration_z": ResponseEntry(
+        "m s-2", f"largest absolute vertical acceleration {_END}", "car"
+    ),
+    "car_end_acceleration_y": ResponseEntry(
+        "m s-2", f"largest absolute lateral acceleration {_END}", "car"
+    ),
+    "sperling_index_z": ResponseEntry(
+        "1", f"Sperling index of the vertical vibration {_END}", "car", timed=False
+    ),
+    "sperling_index_y": ResponseEntry(
+        "1", f"Sperling index of the lateral vibration {_END}", "car", timed=False
+    ),
+    "iso2631_rms_z": ResponseEntry(
+        "m s-2",
+        f"r.m.s. vertical acceleration weighted by W_k of ISO 2631-1 {_END}",
+        "car",
+        timed=False,
+    ),
+    "iso2631_rms_y": ResponseEntry(
+        "m s-2",
+        f"r.m.s. lateral acceleration weighted by W_d of ISO 2631-1 {_END}",
+        "car",
+        timed=False,
+    ),
+    "dynamic_coefficient": ResponseEntry(
+        "1",
+        f"largest absolute vertical displacement {_GIRDER} over the largest under the train at "
+        "rest",
+        "girder",
+    ),
+    "deflection_over_span": ResponseEntry(
+        "1", f"largest absolute vertical displacement {_GIRDER} over the span", "girder"
+    ),
+    "bearing_uplift": ResponseEntry(
+        "m",
+        "largest lift of the girder off any bearing of the middle span, from rest under dead "
+        "weight",
+        "bearing",
+    ),
 }
-"""Meaning of each response, as it follows "largest absolute"."""
+"""Every response that a passage is judged by: its unit and its meaning, in the order of files."""
+
+RESPONSES: tuple[str, ...] = tuple(RESPONSE_TABLE)
+"""All responses in the order in which they are shown."""
+
+PAPER_RESPONSES: tuple[str, ...] = RESPONSES[:6]
+"""The responses of the paper: midspan and car bodies."""
+
+if TYPE_CHECKING:
+    Response: TypeAlias = str
+else:
+    Response = Literal[RESPONSES]
+"""A response of a passage: a name in `RESPONSE_TABLE`."""
+
+TIMED_RESPONSES: tuple[Response, ...] = tuple(
+    name for name, entry in RESPONSE_TABLE.items() if entry.timed
+)
+"""The responses whose values are each of one moment, kept as ``<name>_t``."""
+
+CAR_RESPONSES: tuple[Response, ...] = tuple(
+    name for name, entry in RESPONSE_TABLE.items() if entry.kind == "car"
+)
+"""The responses of cars, kept for each car as ``<name>_per_car``."""
+
+SIGNED_RESPONSES: tuple[Response, ...] = PAPER_RESPONSES[:4]
+"""The responses whose largest values of either sign are kept, as ``<name>_positive`` and
+``<name>_negative``."""
+
+RESPONSE_WORDS: Mapping[Response, str] = {
+    name: entry.words.removeprefix("largest absolute ") for name, entry in RESPONSE_TABLE.items()
+}
+"""Meaning of each response, as it stands before "exceeds a limit"."""
 
 RESPONSE_UNITS: Mapping[Response, str] = {
-    name: "m" if "displacement" in name else "m s-2" for name in RESPONSES
+    name: entry.unit for name, entry in RESPONSE_TABLE.items()
 }
 """Unit of each response in the notation of UDUNITS."""
 

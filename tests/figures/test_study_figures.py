@@ -2,6 +2,7 @@
 
 import json
 from importlib import import_module
+from io import BytesIO
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from maglev.figures import (
     labels,
     layouts_of,
     limits_by_control,
+    prediction,
     stability,
     style,
 )
@@ -81,6 +83,16 @@ def test_any_number_of_responses_has_panels_in_rows_of_three():
     assert [labels.lowest(number, data) for number in range(8)] == [False] * 5 + [True] * 3
 
 
+def test_predictions_of_more_responses_than_a_row_holds_go_on_below(files):
+    (data,) = read(files["prediction"], "prediction")
+    more = data.isel(response=[*range(6), 0, 1])
+    fig, _ = prediction.figure(more)
+    panels = [axis for axis in fig.axes if axis.get_xlabel() != "runs in a cell"]
+    assert len(panels) == 3 * 8
+    assert len({axis.get_ylabel() for axis in panels} - {""}) == 3
+    fig.savefig(BytesIO())  # rows stand where they belong
+
+
 def test_limits_stand_on_the_exceedance_with_their_probability(tmp_path, files):
     draw("exceedance", files["exceedance"], tmp_path / "f")
     n = len(files["exceedance"]) // 2
@@ -94,7 +106,7 @@ def test_limits_stand_on_the_exceedance_with_their_probability(tmp_path, files):
     fig, _ = exceedance.figure(densities, states)
     words = [[text.get_text() for text in axis.texts] for axis in fig.axes]
     assert words[2][0] == "low, 0.55 m/s²" and words[2][1] == "MCM P = 16 [12.8, 19.2] %"
-    assert words[4][0] == "far, 5 m/s² (right of the panel)"
+    assert words[4][0] == "far, 5 m/s² →"
     assert words[0] == words[1] == words[5] == []
     with pytest.raises(ValueError, match="must be of the same methods"):
         exceedance.figure(densities, states[::-1])

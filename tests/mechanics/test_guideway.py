@@ -216,6 +216,22 @@ def test_lifting_one_span_moves_four_dashpots(model, component):
     assert_allclose(force[model.pier_top_dof[3:5, component]], -2e5, rtol=1e-12)
 
 
+@pytest.mark.parametrize("span", [0, 1])
+def test_four_bearings_carry_what_stands_on_their_span(span):
+    """Their closing times their stiffness: in sum the load, and its moments about both axes."""
+    model = build(Guideway(n_spans=2))
+    length, bearing, force, x = 24.768, model.parameters.bearing, 5e4, 7.7
+    rows, _, _, _ = model.rail_rows([span * length + x], RIGHT)
+    motion = spsolve(model.stiffness.tocsc(), force * rows.toarray()[0])
+    right, left, last_right, last_left = -bearing.vertical_stiffness * (
+        model.bearing_rows(span) @ motion
+    )
+    assert_allclose(right + left + last_right + last_left, force, rtol=1e-6)
+    assert_allclose((last_right + last_left) * length, force * x, rtol=2e-2)  # piers turn a little
+    other = model.bearing_rows(1 - span) @ motion
+    assert_allclose(other.sum(), 0.0, atol=1e-6 * force / bearing.vertical_stiffness)
+
+
 def test_degrees_of_freedom_are_each_named_once(model):
     named = np.concatenate([*model.span_dof, model.pier_top_dof.ravel(), *model.pier_dof])
     assert_array_equal(np.sort(named), np.arange(model.n_dof))

@@ -266,6 +266,31 @@ def test_the_rest_completes_the_static_motion_of_midspan(direction, name):
     assert_allclose(kept + rest, exact, rtol=1e-9)
 
 
+@pytest.mark.parametrize(("row", "both"), [(0, False), (2, True)])
+def test_the_rest_completes_the_static_opening_of_the_bearings(row, both):
+    """A force down on the right rail, or sideways on both: each of the four bearings."""
+    x, force = np.array([0.31 * LENGTH]), 1e5
+    sides = (1, -1) if both else (1,)
+    load = sum(
+        force * THREE_SPANS.rail_rows(MIDDLE * LENGTH + x, side)[row].toarray().ravel()
+        for side in sides
+    )
+    exact = THREE_SPANS.bearing_rows(MIDDLE) @ spsolve(THREE_SPANS.stiffness.tocsc(), load)
+    motion = spsolve(REDUCED.stiffness.tocsc(), REDUCED.basis.T @ load)
+    kept = REDUCED.bearing @ motion[REDUCED.span_coordinates[MIDDLE]]
+    up, across = rail_design(x)[0], rail_design(x, lateral=True)[0]
+    rest = np.zeros(4)
+    for end in range(2):
+        mean, roll, lateral = REDUCED.bearing_rest[3 * end : 3 * end + 3]
+        rest[2 * end] = 0.0 if both else force * (mean @ up)
+        rest[2 * end + 1] = 2 * force * (lateral @ across) if both else force * (roll @ up)
+    pairs = kept + rest
+    found = np.array([pairs[0] + pairs[1], pairs[0] - pairs[1]])
+    found = np.concatenate([found, [pairs[2] + pairs[3], pairs[2] - pairs[3]]])
+    assert np.abs(rest).max() > 1e-2 * np.abs(exact).max()
+    assert_allclose(found, exact, rtol=1e-7, atol=1e-9 * np.abs(exact).max())
+
+
 @pytest.mark.parametrize("step", [0.1e-3, 0.36e-3, 2e-3])
 def test_the_stepped_share_of_the_acceleration_makes_an_isolated_mode_exact(step):
     """x(t + Δt) - 2 x + x(t - Δt) = Δt² sinc²(ωΔt/2) (f - ω² x), also for ωΔt beyond 2."""

@@ -1,12 +1,25 @@
-"""The band of the girder's accelerations."""
+"""The table of responses, and the band of the girder's accelerations."""
+
+from typing import get_args
 
 import numpy as np
 import pytest
 import scipy.signal
 from numpy.testing import assert_allclose
 
-from maglev.mechanics.responses import acceleration_filter
+from maglev.datasets import VARIABLES
+from maglev.mechanics.responses import _FOUND, acceleration_filter
 from maglev.parameters import Config
+from maglev.vocabulary import PAPER_RESPONSES, RESPONSE_TABLE, RESPONSES, Response
+
+
+def test_every_response_of_the_table_is_found_and_described():
+    assert tuple(_FOUND) == tuple(RESPONSE_TABLE) == RESPONSES == get_args(Response)
+    assert RESPONSES[:6] == PAPER_RESPONSES
+    for name, entry in RESPONSE_TABLE.items():
+        assert VARIABLES[name].units == entry.unit
+        assert (f"{name}_t" in VARIABLES) == entry.timed
+        assert (f"{name}_per_car" in VARIABLES) == (entry.kind == "car")
 
 
 def low_passes(order, step, frequency):

@@ -121,17 +121,17 @@ def _draw_limits(axis: Axes, states: xr.Dataset, shown: labels.Shown, methods: l
         if low <= limit <= high + _WITHIN * (high - low):
             axis.set_xlim(low, max(high, limit + 0.05 * (limit - low)))
             axis.axvline(limit, color=_LIMIT, lw=0.9, ls=":")
-        where = "" if low <= limit <= axis.get_xlim()[1] else " (right of the panel)"
-        where = " (left of the panel)" if limit < low else where
-        name = str(state["limit_state"].item())
-        lines.append((f"{name}, {limit:.4g} {shown.unit}{where}", _LIMIT))
+        inside = low <= limit <= axis.get_xlim()[1]
+        value = f"{limit:.4g} {shown.unit.replace('-', '')}".rstrip()
+        words = f"{state['limit_state'].item()}, {value}"
+        lines.append((words if inside else f"← {words}" if limit < low else f"{words} →", _LIMIT))
         for curve, method in enumerate(methods):
             one = state.isel(curve=curve)
-            value, least, most = (float(one[f"curve_state_probability{end}"]) for end in _ENDS)
+            ends = [float(one[f"curve_state_probability{end}"]) for end in _ENDS]
             colour = labels.METHOD_STYLE[method]["color"]
-            lines.append((f"{labels.METHOD[method]} {_interval(value, least, most)}", colour))
-            if not where and value > 0:
-                axis.plot([limit], [value], "o", ms=3, color=colour, zorder=4)
+            lines.append((f"{labels.METHOD[method]} {_interval(*ends)}", colour))
+            if inside and ends[0] > 0:
+                axis.plot([limit], ends[:1], "o", ms=3, color=colour, zorder=4)
     for row, (words, colour) in enumerate(lines):
         axis.text(
             0.99,

@@ -80,7 +80,7 @@ def shown(response: str) -> Shown:
     """
     name = response.replace("_", " ").removesuffix(" z").removesuffix(" y")
     side = {"_z": ", vert.", "_y": ", lat."}.get(response[-2:], "")
-    unit = RESPONSE_UNITS[response]  # type: ignore[index]
+    unit = RESPONSE_UNITS[response]
     symbol, scale, written = _AXIS.get(unit, (name, 1.0, unit.replace("1", "-")))
     if "displacement" not in response and symbol == "displacement":
         symbol = name

@@ -78,6 +78,12 @@ def figure(data: xr.Dataset) -> tuple[Figure, xr.Dataset]:
     )
     assert drawn is not None
     fig.colorbar(
-        drawn, ax=axes, location="bottom", shrink=0.4, aspect=40, pad=0.02, label="runs in a cell"
+        drawn,
+        ax=fig.axes,
+        location="bottom",
+        shrink=0.4,
+        aspect=40,
+        pad=0.02,
+        label="runs in a cell",
     )
     return fig, data

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from maglev.compiled import kernel
+from maglev.mechanics._comfort import empty_weighing, weigh
 from maglev.mechanics._magnets import attract, circuits_at_rest, empty_magnet
 from maglev.mechanics._records import (
     COMPLETED,
@@ -45,6 +46,7 @@ def _new_watch(n_magnets, n_sections, n_responses):
     """Empty memory of the watched responses."""
     return Watch(
         zeros(6),
+        zeros(4),
         zeros(4 * n_sections),
         zeros(2 * n_responses),
         zeros(n_magnets),
@@ -138,13 +140,29 @@ def _load_span(spans, span, begin, end, rails, turn, force):
 
 
 @kernel()
-def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway):
+def _left_out_at_bearings(spans, begin, end, force, turn, across, at, watch):
+    """Opening of the middle span's bearings by its left-out modes."""
+    none = load(watch.bearing, 0) * 0.0
+    for side in range(2):
+        mean, half = none, none
+        for k in range(begin, end):
+            mean = fma(load(force, at + k), spans.bearing_rest[3 * side, k], mean)
+            half = fma(load(turn, k), spans.bearing_rest[3 * side + 1, k], half)
+            half = fma(load(across, at + k), spans.bearing_rest[3 * side + 2, k], half)
+        store(watch.bearing, 2 * side, mean)
+        store(watch.bearing, 2 * side + 1, half)
+
+
+@kernel()
+def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway, watch):
     """Transfer the forces on the rails under the train to the guideway's coordinates.
 
     Returns the midspan displacement, z and y, that these forces cause in the left-out modes.
     """
     rest_z = load(guideway.position, 0) * 0.0
     rest_y = rest_z
+    for k in range(4):
+        store(watch.bearing, k, 0.0)
     for span in range(first, last + 1):
         begin, end = _covered(spans, span, tail, nose)
         _load_span(spans, span, begin, end, rails, turn, guideway.force)
@@ -154,6 +172,9 @@ def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway):
                 rest_z = fma(load(rails.force[0], at + k), spans.rest[0, k], rest_z)
                 rest_y = fma(load(turn, k), spans.rest[1, k], rest_y)
                 rest_y = fma(load(rails.force[2], at + k), spans.rest[2, k], rest_y)
+            _left_out_at_bearings(
+                spans, begin, end, rails.force[0], turn, rails.force[2], at, watch
+            )
     return rest_z, rest_y
 
 
@@ -245,31 +266,46 @@ def _covered(spans, span, tail, nose):
 
 
 @kernel()
-def _keep_extreme(outcome, place, value, time):
-    size = maximum(value, -1.0 * value)
+def _keep_largest(outcome, place, size, time):
     best = load(outcome.extreme, place)
     store(outcome.extreme_time, place, choose(size, best, time, load(outcome.extreme_time, place)))
     store(outcome.extreme, place, maximum(size, best))
 
 
 @kernel()
-def _keep_peak(outcome, watch, place, value, time, dt):
-    """Keep the size and time of a response's largest peak.
+def _peak(watch, place, value):
+    """Vertex of the parabola through a motion's last three values, and twice how far back it is.
 
-    A peak is the vertex of the parabola through three values in a row, of which the middle one is
-    the largest; the values themselves miss it by up to (ωΔt)²/8 of its size.
+    A peak is such a vertex of which the middle value is the largest; the values themselves miss it
+    by up to (ωΔt)²/8 of its size.  The way counts from the middle value [steps].
     """
     before, middle = load(watch.recent, 2 * place), load(watch.recent, 2 * place + 1)
     rise = value - before
-    # twice the way back from the middle to the vertex [steps]; beyond 1 another value is nearer
     back = rise / (value - middle - middle + before)
-    back = choose(1.0, maximum(back, -1.0 * back), back, 0.0)
-    _keep_extreme(
-        outcome, place, fma(rise * back, -0.125, middle), back * (-0.5 * dt) + (time - dt)
-    )
-    _keep_extreme(outcome, place, value, time)  # the last of all has none behind it
+    back = choose(1.0, maximum(back, -1.0 * back), back, 0.0)  # beyond 1 another value is nearer
     store(watch.recent, 2 * place, middle)
     store(watch.recent, 2 * place + 1, value)
+    return fma(rise * back, -0.125, middle), back
+
+
+@kernel()
+def _keep_peak(outcome, watch, place, value, time, dt):
+    """Keep the size of a motion's largest peak, and when it was; return the vertex of `_peak`."""
+    peak, back = _peak(watch, place, value)
+    when = back * (-0.5 * dt) + (time - dt)
+    _keep_largest(outcome, place, maximum(peak, -1.0 * peak), when)
+    # the last of all has none behind it
+    _keep_largest(outcome, place, maximum(value, -1.0 * value), time)
+    return peak
+
+
+@kernel()
+def _keep_signs(outcome, place, peak, value):
+    """Keep the largest of a motion in its direction, and the largest against it."""
+    up = maximum(maximum(peak, value), load(outcome.signed, 2 * place))
+    down = maximum(maximum(-1.0 * peak, -1.0 * value), load(outcome.signed, 2 * place + 1))
+    store(outcome.signed, 2 * place, up)
+    store(outcome.signed, 2 * place + 1, down)
 
 
 @kernel()
@@ -311,8 +347,10 @@ def _watch_midspan(spans, timing, step, direction, rest, guideway, watch, outcom
     store(watch.left_out, 3 * direction + 2, raw)
     smooth = _low_pass(timing.sections, direction, watch, smooth)
     time = step * dt
-    _keep_peak(outcome, watch, direction, shift, time, dt)
-    _keep_peak(outcome, watch, 2 + direction, smooth, time - dt, dt)
+    peak = _keep_peak(outcome, watch, direction, shift, time, dt)
+    _keep_signs(outcome, direction, peak, shift)
+    peak = _keep_peak(outcome, watch, 2 + direction, smooth, time - dt, dt)
+    _keep_signs(outcome, 2 + direction, peak, smooth)
     every = timing.record_every
     if every > 0 and step % every == 0:
         store(outcome.history[step // every - 1], direction, shift)
@@ -323,8 +361,30 @@ def _watch_midspan(spans, timing, step, direction, rest, guideway, watch, outcom
 
 
 @kernel()
+def _watch_bearings(spans, timing, step, place, guideway, watch, outcome):
+    """Lift of the girder off the bearings of the middle span, the largest of the four."""
+    n_columns = spans.output_column.size
+    lift = load(watch.bearing, 0) * 0.0
+    for side in range(2):
+        mean, half = load(watch.bearing, 2 * side), load(watch.bearing, 2 * side + 1)
+        for k in range(n_columns):
+            motion = load(guideway.position, entry(spans.output_column, k))
+            mean = fma(motion, entry(spans.bearing, 2 * side * n_columns + k), mean)
+            half = fma(motion, entry(spans.bearing, (2 * side + 1) * n_columns + k), half)
+        higher = mean + maximum(half, -1.0 * half)
+        lift = higher if side == 0 else maximum(lift, higher)
+    time, dt = step * timing.time_step, timing.time_step
+    peak, back = _peak(watch, place, lift)
+    _keep_largest(outcome, place, peak, back * (-0.5 * dt) + (time - dt))
+    _keep_largest(outcome, place, lift, time)
+
+
+@kernel()
 def _watch_cars(vehicle, timing, step, train, watch, outcome):
-    """Record the accelerations of the car bodies."""
+    """Accelerations of the car bodies, and the larger of those at their two ends.
+
+    Of ``up - arm turn`` and ``up + arm turn`` the larger size is ``|up| + arm |turn|``.
+    """
     dt = timing.time_step
     n_cars = vehicle.body_z.size
     record = timing.record_every > 0 and step % timing.record_every == 0
@@ -334,6 +394,13 @@ def _watch_cars(vehicle, timing, step, train, watch, outcome):
         across = load(train.force, lateral) * vehicle.inverse_mass[lateral]
         _keep_peak(outcome, watch, 4 + car, up, step * dt, dt)
         _keep_peak(outcome, watch, 4 + n_cars + car, across, step * dt, dt)
+        pitch, yaw = vehicle.body_pitch[car], vehicle.body_yaw[car]
+        turn = load(train.force, pitch) * (vehicle.inverse_mass[pitch] * vehicle.end_distance)
+        swing = load(train.force, yaw) * (vehicle.inverse_mass[yaw] * vehicle.end_distance)
+        end_z = maximum(up, -1.0 * up) + maximum(turn, -1.0 * turn)
+        end_y = maximum(across, -1.0 * across) + maximum(swing, -1.0 * swing)
+        _keep_peak(outcome, watch, 4 + 2 * n_cars + car, end_z, step * dt, dt)
+        _keep_peak(outcome, watch, 4 + 3 * n_cars + car, end_y, step * dt, dt)
         if record:
             row = step // timing.record_every - 1
             store(outcome.history[row], 4 + car, up)
@@ -422,6 +489,7 @@ def cross(
     lifting_circuits = circuits_at_rest(suspension, suspension_law)
     guiding_circuits = circuits_at_rest(guidance, guidance_law)
     watch = _new_watch(n_magnets, timing.sections.shape[0], outcome.extreme.shape[0])
+    weighing = empty_weighing(timing.comfort, n_cars)
     with_magnets = timing.record_every > 0 and outcome.history.shape[1] > 4 + 2 * n_cars
     stretch = -1
     for step in range(timing.first_step, timing.n_steps + 1):
@@ -446,12 +514,16 @@ def cross(
             guidance_footprints, guidance, guidance_law, step, dt, gains, train, rails,
             guiding, guiding_circuits, record, watch, outcome,
         )  # fmt: skip
-        rest_z, rest_y = _load_guideway(spans, first, last, tail, nose, rails, turn, guideway)
+        rest_z, rest_y = _load_guideway(
+            spans, first, last, tail, nose, rails, turn, guideway, watch
+        )
         if stretch >= 0:
             _answer(spans, stretch, guideway)
         _watch_midspan(spans, timing, step, 0, rest_z, guideway, watch, outcome)
         _watch_midspan(spans, timing, step, 1, rest_y, guideway, watch, outcome)
+        _watch_bearings(spans, timing, step, 4 + 4 * n_cars, guideway, watch, outcome)
         _watch_cars(vehicle, timing, step, train, watch, outcome)
+        weigh(timing.comfort, vehicle, step, dt, train, weighing, outcome)
         if record:
             _record_magnets(timing, step, n_cars, watch, outcome)
         if _all_lost(timing, watch, outcome, step * dt):

@@ -32,6 +32,9 @@ class Vehicle(NamedTuple):
     pull_coefficient: np.ndarray  # (non-zero,)
     body_z: np.ndarray  # (car,) degree of freedom
     body_y: np.ndarray  # (car,)
+    body_pitch: np.ndarray  # (car,)
+    body_yaw: np.ndarray  # (car,)
+    end_distance: float  # of the ends of a car body's floor from its centre [m]
 
 
 class MagnetRows(NamedTuple):
@@ -122,12 +125,30 @@ class Watch(NamedTuple):
     """Memory of the watched responses: filter states, last values, gaps and currents."""
 
     left_out: np.ndarray  # (6, LANES) midspan by left-out modes, its change, acceleration; z, y
+    bearing: np.ndarray  # (4, LANES) opening of the bearings by left-out modes, as `Spans.bearing`
     filtered: np.ndarray  # (4 section, LANES) state of the low-pass
     recent: np.ndarray  # (2 response, LANES) last two values of each response
     magnet_min: np.ndarray  # (magnet, LANES) smallest gap of each magnet at this step [m]
     magnet_max: np.ndarray  # (magnet, LANES)
     magnet_gap: np.ndarray  # (magnet, LANES) mean of its poles [m]
     magnet_current: np.ndarray  # (magnet, LANES) [A]
+
+
+class Comfort(NamedTuple):
+    """Weightings of the accelerations at the ends of the car bodies, and when they are read."""
+
+    every: int  # steps between two readings
+    start: np.ndarray  # (weighting + 1,) into the sections; vertical and lateral in turns
+    sections: np.ndarray  # (section, 6)
+    first: np.ndarray  # (car,) step of the first reading that counts
+    last: np.ndarray  # (car,) step of the last
+
+
+class Weighing(NamedTuple):
+    """State of the filters of all cars."""
+
+    velocity: np.ndarray  # (4 car, LANES) z, pitch, y, yaw of each body at the last reading
+    filtered: np.ndarray  # (2 section of every end, LANES)
 
 
 class Stretches(NamedTuple):
@@ -187,6 +208,9 @@ class Spans(NamedTuple):
     midspan: np.ndarray  # (2, output column) z and y
     middle: int  # span that midspan is of
     rest: np.ndarray  # (3, stride) midspan z by z, y by roll and y of its left-out modes [m/N]
+    bearing: np.ndarray  # (4, output column) opening at the first end, mean and half difference of
+    # right and left, then at the last
+    bearing_rest: np.ndarray  # (6, stride) at each end mean by z, half difference by roll and y
 
 
 class Footprints(NamedTuple):
@@ -214,13 +238,17 @@ class Timing(NamedTuple):
     gap_lost: float
     sections: np.ndarray  # (section, 6) low-pass on guideway accelerations
     record_every: int  # steps between recorded rows; zero: none
+    comfort: Comfort
 
 
 class Outcome(NamedTuple):
     """Results of one row of samples."""
 
-    extreme: np.ndarray  # (4 + 2 car, LANES) girder z, y, acceleration z, y; bodies' z; bodies' y
+    extreme: np.ndarray  # (5 + 4 car, LANES) girder z, y, acceleration z, y; bodies' z; bodies' y;
+    # their ends' z; ends' y; lift off the bearings
     extreme_time: np.ndarray  # same
+    signed: np.ndarray  # (8, LANES) girder's largest positive and largest negative, in turns
+    squares: np.ndarray  # (2 car weighting, LANES) sum of weighted accelerations squared
     gap_min: np.ndarray  # (kind, LANES)
     gap_max: np.ndarray
     current_max: np.ndarray

@@ -180,6 +180,31 @@ class GuidewayModel:
         u_z, _, u_y, _ = _line_rows(self.girder_line, x, self.n_dof)
         return u_z, u_y
 
+    def bearing_rows(self, span: int) -> sparse.csr_array:
+        """Rows that give how far a span has lifted off its bearings.
+
+        Parameters
+        ----------
+        span
+            Number of the span.
+
+        Returns
+        -------
+        opening : csr (4, dof)
+            Motion of the pier top down less that of the girder end [m]: right and left at the first
+            end, right and left at the last.
+        """
+        bearing, dof = self.parameters.bearing, self.span_dof[span]
+        rows = np.zeros((4, self.n_dof))
+        for end in range(2):
+            x = (span + end) * self.parameters.span_length
+            girder = dof[np.abs(self.place[dof] - [x, 0.0, 0.0]).max(axis=1) < 1e-6]
+            girder = girder[np.argsort(self.component[girder])]
+            for side, y in enumerate((bearing.y, -bearing.y)):
+                rows[2 * end + side, girder] = -_rigid_arm(y, bearing.z)[Z]
+                rows[2 * end + side, self.pier_top_dof[span + end]] = _rigid_arm(y, 0.0)[Z]
+        return sparse.csr_array(rows)
+
 
 @dataclass(frozen=True)
 class ModalDamping:

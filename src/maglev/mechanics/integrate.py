@@ -26,12 +26,14 @@ from maglev.mechanics._records import (
     Timing,
     Vehicle,
 )
+from maglev.mechanics.comfort import WEIGHTINGS, readings
 from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.linear import Block
 from maglev.mechanics.reduction import ReducedGuideway, reduce
-from maglev.mechanics.responses import Passages, checked_gains
+from maglev.mechanics.responses import Passages, checked_gains, compared_with
+from maglev.mechanics.statics import largest_deflection
 from maglev.mechanics.step_limit import (
     guideway_limit,
     safe_gains,
@@ -45,7 +47,10 @@ from maglev.parameters import Config
 
 @dataclass(frozen=True)
 class System:
-    """Train, guideway, magnets and track as arrays for the kernels."""
+    """Train, guideway, magnets and track as arrays for the kernels.
+
+    ``static_deflection`` is the largest of midspan under the train at rest [m].
+    """
 
     train: train_model.TrainModel
     reduced: ReducedGuideway
@@ -58,6 +63,7 @@ class System:
     spans: Spans
     parts: tuple[Block, ...]
     safe_gains: FloatArray
+    static_deflection: float
     config: Config
 
 
@@ -114,6 +120,7 @@ def prepare(config: Config, profile: Profile) -> System:
         spans=packing.spans(reduced, config),
         parts=parts,
         safe_gains=safe_gains(parts, _mean_gains(config), course(config).time_step),
+        static_deflection=largest_deflection(guideway, train),
         config=config,
     )
 
@@ -280,13 +287,30 @@ def _gathered(
     bounds = np.where(is_lost[:, None], samples_first("at_loss"), bounds)
     bounds[too_fast], history[too_fast] = np.nan, np.nan
     at = 4 + 2 * n_cars
+    ends = extreme[:, at : at + 2 * n_cars]
+    ends_time = when[:, at : at + 2 * n_cars]
+    signed = samples_first("signed")
+    squares = samples_first("squares").reshape(n_samples, len(WEIGHTINGS), n_cars, 2)
+    weighted = np.sqrt(squares.max(axis=3) / readings(system.config).count)
+    for of_sample in (signed, weighted):
+        of_sample[status != COMPLETED] = np.nan
     return Passages(
         girder=extreme[:, :4],
         girder_time=when[:, :4],
         body_z=extreme[:, 4 : 4 + n_cars],
-        body_y=extreme[:, 4 + n_cars :],
+        body_y=extreme[:, 4 + n_cars : at],
         body_z_time=when[:, 4 : 4 + n_cars],
-        body_y_time=when[:, 4 + n_cars :],
+        body_y_time=when[:, 4 + n_cars : at],
+        girder_positive=signed[:, 0::2],
+        girder_negative=signed[:, 1::2],
+        end_z=ends[:, :n_cars],
+        end_y=ends[:, n_cars:],
+        end_z_time=ends_time[:, :n_cars],
+        end_y_time=ends_time[:, n_cars:],
+        weighted=weighted,
+        lift=extreme[:, -1],
+        lift_time=when[:, -1],
+        **compared_with(system.config, system.static_deflection, n_samples),
         gap_min=bounds[:, 0:2],
         gap_max=bounds[:, 2:4],
         current_max=bounds[:, 4:6],

@@ -12,6 +12,7 @@ from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics._records import (
+    Comfort,
     Footprints,
     Law,
     MagnetRows,
@@ -22,6 +23,7 @@ from maglev.mechanics._records import (
     Vehicle,
 )
 from maglev.mechanics.activity import Stretch, stepped_mass, stretches, top_stiffness
+from maglev.mechanics.comfort import WEIGHTINGS, readings
 from maglev.mechanics.control import grouping, late_current
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile, mean_displacement
@@ -72,6 +74,9 @@ def vehicle(train: train_model.TrainModel) -> Vehicle:
         pull_coefficient=columns.data.astype(np.float64),
         body_z=np.ascontiguousarray(train.car_body_dof[:, 1], dtype=np.int64),
         body_y=np.ascontiguousarray(train.car_body_dof[:, 0], dtype=np.int64),
+        body_pitch=np.ascontiguousarray(train.car_body_dof[:, 3], dtype=np.int64),
+        body_yaw=np.ascontiguousarray(train.car_body_dof[:, 4], dtype=np.int64),
+        end_distance=train.parameters.end_distance,
     )
 
 
@@ -343,6 +348,8 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
         midspan=midspan,
         middle=middle,
         rest=np.stack([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
+        bearing=np.stack([_relative(reduced, middle, shape) for shape in reduced.bearing]),
+        bearing_rest=reduced.bearing_rest,
         damping_column=damping_column,
         damping=damping,
         taken_mode=taken_mode,
@@ -458,6 +465,20 @@ def timing(config: Config, record_every: int) -> Timing:
         gap_lost=passage.gap_lost,
         sections=np.ascontiguousarray(acceleration_filter(passage, way.time_step)),
         record_every=record_every,
+        comfort=_comfort(config),
+    )
+
+
+def _comfort(config: Config) -> Comfort:
+    """Weightings of the cars' accelerations for the kernels."""
+    read = readings(config)
+    filters = [one.sections(read.every * course(config).time_step) for one in WEIGHTINGS]
+    return Comfort(
+        every=read.every,
+        start=np.cumsum([0, *(len(one) for one in filters)]),
+        sections=np.concatenate(filters),
+        first=read.first,
+        last=read.last,
     )
 
 
@@ -484,8 +505,10 @@ def empty_outcome(
         history[:, 4 + 2 * n_cars : -n_magnets] = gap[of_kind]
         history[:, -n_magnets:] = current[of_kind]
     return Outcome(
-        extreme=np.zeros((4 + 2 * n_cars, LANES)),
-        extreme_time=np.zeros((4 + 2 * n_cars, LANES)),
+        extreme=np.zeros((5 + 4 * n_cars, LANES)),
+        extreme_time=np.zeros((5 + 4 * n_cars, LANES)),
+        signed=np.zeros((8, LANES)),
+        squares=np.zeros((2 * n_cars * len(WEIGHTINGS), LANES)),
         gap_min=gap.copy(),
         gap_max=gap.copy(),
         current_max=current,

@@ -58,6 +58,13 @@ class ReducedGuideway:
     rest_z, rest_roll, rest_y : (coefficient,)
         Flexibility of midspan in the left-out modes of the middle span: z under forces on
         ``rail_z``, y under forces on ``rail_roll`` and ``rail_y`` [m/N].
+    bearing : (4, column)
+        Opening of the middle span's bearings per unit coordinate: at the first end the mean of
+        right and left and half their difference, then at the last.
+    bearing_rest : (6, coefficient)
+        That opening, which its modes leave out, under forces on the rails of the middle span [m/N]:
+        at either end the mean under those on ``rail_z``, half the difference under those on
+        ``rail_roll`` and on ``rail_y``.
     basis : (dof, coordinate)
         Motion of the finite-element model per unit coordinate.
     """
@@ -77,6 +84,8 @@ class ReducedGuideway:
     rest_z: FloatArray
     rest_roll: FloatArray
     rest_y: FloatArray
+    bearing: FloatArray
+    bearing_rest: FloatArray
     basis: sp.csr_array
 
     @property
@@ -454,16 +463,20 @@ def reduce(
         rest_z=np.empty(0),
         rest_roll=np.empty(0),
         rest_y=np.empty(0),
+        bearing=(_bearing_pairs(model, middle) @ basis[:, columns[middle]]).toarray(),
+        bearing_rest=np.empty(0),
         basis=basis,
     )
     bearings = (basis.T @ model.bearing_damping @ basis).toarray()
     rest_z, rest_roll, rest_y = _rest_at_midspan(model, reduced)
+    bearing_rest = _rest_at_bearings(model, reduced)
     return replace(
         reduced,
         relative_damping=_relative_damping(reduced, bearings, cutoff),
         rest_z=rest_z,
         rest_roll=rest_roll,
         rest_y=rest_y,
+        bearing_rest=bearing_rest,
     )
 
 
@@ -591,17 +604,42 @@ def _rest_at_midspan(
     z under forces on the coefficients of z, y under forces on those of roll and of y.
     """
     middle = model.parameters.n_spans // 2
+    at = np.array([(middle + 0.5) * model.parameters.span_length])
+    up, across = (_left_out(model, reduced, row)[0] for row in model.girder_rows(at))
+    z, roll, y = (rows[:, model.span_dof[middle]] for rows in _rail_nodes_rows(model, middle))
+    return z @ up, roll @ across, y @ across
+
+
+def _left_out(
+    model: full.GuidewayModel, reduced: ReducedGuideway, rows: sp.csr_array
+) -> FloatArray:
+    """Motion (row, dof of the span) of places in the middle span under a unit force on each of its
+    degrees of freedom, by the modes that it leaves out; its pier tops stand still."""
+    middle = model.parameters.n_spans // 2
     dof, own = model.span_dof[middle], reduced.own_modes(middle)
     shapes = reduced.basis[dof][:, own].toarray()
     square = reduced.stiffness.diagonal()[own]
     factors = scipy.sparse.linalg.splu(model.stiffness[dof][:, dof].tocsc())
-    at = np.array([(middle + 0.5) * model.parameters.span_length])
-    rests = []
-    for row in model.girder_rows(at):
-        here = row[:, dof].toarray().ravel()
-        rests.append(factors.solve(here) - shapes @ (shapes.T @ here / square))
-    z, roll, y = (rows[:, dof] for rows in _rail_nodes_rows(model, middle))
-    return z @ rests[0], roll @ rests[1], y @ rests[1]
+    found = []
+    for here in rows[:, dof].toarray():
+        found.append(factors.solve(here) - shapes @ (shapes.T @ here / square))
+    return np.stack(found)
+
+
+def _bearing_pairs(model: full.GuidewayModel, span: int) -> sp.csr_array:
+    """Rows (4, dof): at either end of a span the mean opening of its two bearings, and half the
+    difference."""
+    right_and_left = 0.5 * np.array([[1.0, 1.0], [1.0, -1.0]])
+    return sp.csr_array(sp.block_diag([right_and_left] * 2) @ model.bearing_rows(span))
+
+
+def _rest_at_bearings(model: full.GuidewayModel, reduced: ReducedGuideway) -> FloatArray:
+    """Flexibility of the middle span's bearings by left-out modes (6, coefficient) [m/N]."""
+    middle = model.parameters.n_spans // 2
+    left_out = _left_out(model, reduced, _bearing_pairs(model, middle))
+    z, roll, y = (rows[:, model.span_dof[middle]] for rows in _rail_nodes_rows(model, middle))
+    pairs = ((left_out[0], left_out[1]), (left_out[2], left_out[3]))
+    return np.stack([one for mean, half in pairs for one in (z @ mean, roll @ half, y @ half)])
 
 
 def _rail_pieces(

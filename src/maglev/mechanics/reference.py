@@ -26,6 +26,7 @@ from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
+from maglev.mechanics.comfort import weighted_rms
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.reference_magnets import Poles
@@ -35,7 +36,9 @@ from maglev.mechanics.responses import (
     Passages,
     acceleration_filter,
     checked_gains,
+    compared_with,
 )
+from maglev.mechanics.statics import largest_deflection
 from maglev.parameters import Config
 
 FIRST_STEP = 0.36e-3
@@ -64,6 +67,9 @@ NEGLIGIBLE = 1e-3
 
 RESPONSES = (*GIRDER_RESPONSES, "car_body_acceleration_z", "car_body_acceleration_y")
 """The six responses whose error is estimated."""
+
+_EXTRAPOLATED = ("girder", "body_z", "body_y", "body_pitch", "body_yaw", "opening")
+"""The histories of a record that are extrapolated."""
 
 _LOG = logging.getLogger(__name__)
 
@@ -120,6 +126,10 @@ class Record:
         In the order of `GIRDER_RESPONSES` [m, m/s²]; accelerations in their band once finished.
     body_z, body_y : (step, car, sample)
         Accelerations of the car bodies [m/s²].
+    body_pitch, body_yaw : (step, car, sample)
+        Their angular accelerations [rad/s²].
+    opening : (step, 4, sample)
+        Of the middle span's bearings, as in `GuidewayModel.bearing_rows` [m].
     gap_min, gap_max, current_max : (step, kind, sample)
         Over all poles of a kind [m, m, A].
     gap, current : (record, magnet, sample)
@@ -136,6 +146,9 @@ class Record:
     girder: FloatArray
     body_z: FloatArray
     body_y: FloatArray
+    body_pitch: FloatArray
+    body_yaw: FloatArray
+    opening: FloatArray
     gap_min: FloatArray
     gap_max: FloatArray
     current_max: FloatArray
@@ -166,6 +179,9 @@ def _blank(of: System, n_steps: int, n_records: int) -> Record:
         girder=filled(n_steps, np.zeros((4, 1))),
         body_z=filled(n_steps, nothing),
         body_y=filled(n_steps, nothing),
+        body_pitch=filled(n_steps, nothing),
+        body_yaw=filled(n_steps, nothing),
+        opening=filled(n_steps, np.zeros((4, 1))),
         gap_min=filled(n_steps, gap),
         gap_max=filled(n_steps, gap),
         current_max=filled(n_steps, current),
@@ -185,27 +201,28 @@ class Watch:
     ----------
     midspan : csr (2, guideway dof)
         Displacement of midspan of the middle span, down and right [-].
-    body_z, body_y : (car,)
-        Degrees of freedom of the car bodies.
+    bearings : csr (4, guideway dof)
+        Opening of the middle span's bearings [-, m].
+    body : (car, 5)
+        Degrees of freedom of the car bodies: y, z, roll, pitch, yaw.
     per_magnet : csr (magnet, pole)
         Mean of the poles of each magnet [-].
     """
 
     midspan: sp.csr_array
-    body_z: IntArray
-    body_y: IntArray
+    bearings: sp.csr_array
+    body: IntArray
     per_magnet: sp.csr_array
 
 
 def watch(config: Config, model: guideway_model.GuidewayModel, poles: Poles) -> Watch:
     """Find the rows and degrees of freedom of the responses."""
     middle = (config.guideway.n_spans // 2 + 0.5) * config.guideway.span_length
-    body = train_model.build(config.train).car_body_dof
     share = 1 / np.bincount(poles.magnet)[poles.magnet]
     return Watch(
         midspan=sp.csr_array(sp.vstack(model.girder_rows(np.array([middle])))),
-        body_z=body[:, 1],
-        body_y=body[:, 0],
+        bearings=model.bearing_rows(config.guideway.n_spans // 2),
+        body=train_model.build(config.train).car_body_dof,
         per_magnet=sp.csr_array((share, (poles.magnet, np.arange(poles.magnet.size)))),
     )
 
@@ -214,7 +231,11 @@ def _note(record: Record, step: int, every: int, of: System, at: Watch, state: S
     """Record the responses of a step."""
     record.girder[step, :2] = at.midspan @ state.guideway.x
     record.girder[step, 2:] = at.midspan @ state.guideway.a
-    record.body_z[step], record.body_y[step] = state.train.a[at.body_z], state.train.a[at.body_y]
+    of_bodies = (record.body_y, record.body_z, None, record.body_pitch, record.body_yaw)
+    for column, history in enumerate(of_bodies):
+        if history is not None:
+            history[step] = state.train.a[at.body[:, column]]
+    record.opening[step] = at.bearings @ state.guideway.x
     gap, current = state.magnets.gap, state.magnets.current
     for kind in range(2):
         of_kind = of.poles.is_guidance == bool(kind)
@@ -393,7 +414,7 @@ def integrate(
         energy=True,
         progress=progress,
     )
-    return passages_of(record, record_every), energy_of(record)
+    return passages_of(record, config, record_every), energy_of(record)
 
 
 @dataclass(frozen=True)
@@ -494,7 +515,7 @@ def solve(
         effort = Effort(h, n, error, perf_counter() - began)
         _LOG.info("reference: %s", _told(effort))
         if not (error > tolerance).any() and (before is not None or have_faces):
-            return passages_of(better, rows), effort
+            return passages_of(better, config, rows), effort
         coarse, before = fine, six_extremes(better)
     raise UserError(
         f"reference: expected errors of at most {100 * tolerance:g} %, got {_told(effort)}; "
@@ -512,7 +533,7 @@ def extrapolated(coarse: Record, fine: Record) -> Record:
 
     status = np.where(coarse.fate.status != 0, coarse.fate.status, fine.fate.status)
     fate = replace(fine.fate, status=status) if (status != fine.fate.status).any() else fine.fate
-    changed = {name: better(name) for name in ("girder", "body_z", "body_y")}
+    changed = {name: better(name) for name in _EXTRAPOLATED}
     return replace(fine, fate=fate, **changed)
 
 
@@ -560,9 +581,29 @@ def _worst(error: FloatArray) -> FloatArray:
     return np.where(np.isnan(error), 0.0, error).max(axis=0)
 
 
-def passages_of(record: Record, every: int) -> Passages:
+def _at_ends(middle: FloatArray, turn: FloatArray, arm: float) -> FloatArray:
+    """Accelerations (step, end, car, sample) at both ends of the cars' floors."""
+    return np.stack([middle + arm * turn, middle - arm * turn], axis=1)
+
+
+def passages_of(record: Record, config: Config, every: int) -> Passages:
     """Extremes, outcomes and thinned histories of a record."""
     status = record.fate.status
+    arm = config.train.end_distance
+    ends = (
+        _at_ends(record.body_z, record.body_pitch, -arm),
+        _at_ends(record.body_y, record.body_yaw, arm),
+    )
+    (end_z, end_z_time), (end_y, end_y_time) = (
+        _largest(*extremes(history, record.time, status), axis=2) for history in ends
+    )
+    one_way, other_way = (
+        _one_sided(sign * record.girder, record.time, status)[0] for sign in (1.0, -1.0)
+    )
+    lift, lift_time = _largest(*_one_sided(record.opening, record.time, status), axis=1)
+    weighted = weighted_rms(config, record.time, ends)
+    weighted[status != 0] = np.nan
+    models = guideway_model.build(config.guideway), train_model.build(config.train)
     girder, girder_time = extremes(record.girder, record.time, status)
     body_z, body_z_time = extremes(record.body_z, record.time, status)
     body_y, body_y_time = extremes(record.body_y, record.time, status)
@@ -574,6 +615,16 @@ def passages_of(record: Record, every: int) -> Passages:
     return Passages(
         girder=girder,
         girder_time=girder_time,
+        girder_positive=one_way,
+        girder_negative=other_way,
+        end_z=end_z,
+        end_y=end_y,
+        end_z_time=end_z_time,
+        end_y_time=end_y_time,
+        weighted=weighted,
+        lift=lift,
+        lift_time=lift_time,
+        **compared_with(config, largest_deflection(*models), status.size),
         body_z=body_z,
         body_y=body_y,
         body_z_time=body_z_time,
@@ -591,6 +642,24 @@ def passages_of(record: Record, every: int) -> Passages:
         gap_history=samples_first(record.gap),
         current_history=samples_first(record.current),
     )
+
+
+def _one_sided(
+    history: FloatArray, time: FloatArray, status: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """As `extremes`, of values above zero alone; the last value may be the largest."""
+    above = np.maximum(history, 0.0)
+    value, when = extremes(above, time, status)
+    last = above[-1].T >= above.max(axis=0).T
+    ends = last & (status == 0).reshape(-1, *[1] * (value.ndim - 1)) & (above[-1].T > 0)
+    return np.where(ends, above[-1].T, value), np.where(ends, time[-1], when)
+
+
+def _largest(value: FloatArray, when: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
+    """Largest of the values along an axis, and when it was; NaN for lost samples."""
+    at = np.expand_dims(np.where(np.isnan(value), -1.0, value).argmax(axis), axis)
+    largest, its_time = (np.take_along_axis(one, at, axis).squeeze(axis) for one in (value, when))
+    return largest, its_time
 
 
 def extremes(

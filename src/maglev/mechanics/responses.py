@@ -1,16 +1,19 @@
-"""Reported responses: their band, their histories and extremes over a set of passages."""
+"""Reported responses: their band, what is watched of passages, and what follows from it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.parameters import Passage
+from maglev.mechanics.comfort import sperling_index
+from maglev.parameters import Config, Passage
+from maglev.vocabulary import RESPONSES, Response
 
 GIRDER_RESPONSES = (
     "girder_displacement_z",
@@ -29,8 +32,21 @@ class Passages:
     ----------
     girder, girder_time : (sample, response)
         Largest absolute value [m, m/s²] and when it occurred [s]; NaN where levitation was lost.
+    girder_positive, girder_negative : (sample, response)
+        Largest value downwards or to the right, and largest the other way [m, m/s²]; likewise.
     body_z, body_y, body_z_time, body_y_time : (sample, car)
         Largest absolute acceleration of each car body [m/s²] and when it occurred [s]; likewise.
+    end_z, end_y, end_z_time, end_y_time : (sample, car)
+        The same of the ends of its floor.
+    weighted : (sample, weighting, car)
+        Root mean square at the worse end of each car's floor, in the order of
+        `maglev.mechanics.comfort.WEIGHTINGS` [m/s²]; likewise.
+    lift, lift_time : (sample,)
+        Largest lift off a bearing of the middle span [m] and when it occurred [s]; likewise.
+    gap_reference, current_limit : (sample, kind)
+        Gap at rest [m] and largest current of the chopper [A] of suspension and guidance.
+    span_length, static_deflection : (sample,)
+        Of the guideway [m], and the largest deflection of midspan under the train at rest [m].
     gap_min, gap_max, current_max : (sample, kind)
         Of suspension and guidance [m, m, A].
     status : (sample,)
@@ -52,10 +68,23 @@ class Passages:
 
     girder: FloatArray
     girder_time: FloatArray
+    girder_positive: FloatArray
+    girder_negative: FloatArray
     body_z: FloatArray
     body_y: FloatArray
     body_z_time: FloatArray
     body_y_time: FloatArray
+    end_z: FloatArray
+    end_y: FloatArray
+    end_z_time: FloatArray
+    end_y_time: FloatArray
+    weighted: FloatArray
+    lift: FloatArray
+    lift_time: FloatArray
+    gap_reference: FloatArray
+    current_limit: FloatArray
+    span_length: FloatArray
+    static_deflection: FloatArray
     gap_min: FloatArray
     gap_max: FloatArray
     current_max: FloatArray
@@ -68,6 +97,171 @@ class Passages:
     body_y_history: FloatArray
     gap_history: FloatArray
     current_history: FloatArray
+
+
+@dataclass(frozen=True)
+class Found:
+    """One response of a set of passages.
+
+    Attributes
+    ----------
+    value : (sample,)
+        NaN where levitation was lost.
+    time : (sample,)
+        When it occurred [s], of a response that is of one moment.
+    per_car : (sample, car)
+        Of a response of cars, of which the value is the largest.
+    positive, negative : (sample,)
+        Largest in the direction of the axis and against it, where both are kept.
+    """
+
+    value: FloatArray
+    time: FloatArray | None = None
+    per_car: FloatArray | None = None
+    positive: FloatArray | None = None
+    negative: FloatArray | None = None
+
+    @property
+    def parts(self) -> dict[str, FloatArray]:
+        """What there is, by the end of its name in a file."""
+        all_parts = {
+            "": self.value,
+            "_t": self.time,
+            "_per_car": self.per_car,
+            "_positive": self.positive,
+            "_negative": self.negative,
+        }
+        return {name: values for name, values in all_parts.items() if values is not None}
+
+
+def compared_with(
+    config: Config, static_deflection: float, n_samples: int
+) -> dict[str, FloatArray]:
+    """What responses of samples that share a configuration are compared with, for `Passages`.
+
+    Parameters
+    ----------
+    config
+        Their configuration.
+    static_deflection
+        Largest deflection of midspan under the train at rest [m].
+    n_samples
+        Number of samples.
+
+    Examples
+    --------
+    >>> compared_with(Config(), 1.6e-3, 1)["current_limit"].tolist()
+    [[120.0, 120.0]]
+    """
+    magnets = (config.train.suspension_magnet, config.train.guidance_magnet)
+    one = {
+        "gap_reference": [magnet.gap_reference for magnet in magnets],
+        "current_limit": [magnet.current_max for magnet in magnets],
+        "span_length": config.guideway.span_length,
+        "static_deflection": static_deflection,
+    }
+    return {name: np.array([value] * n_samples) for name, value in one.items()}
+
+
+def responses(passages: Passages) -> dict[Response, Found]:
+    """All responses of a set of passages, in the order of `maglev.vocabulary.RESPONSES`.
+
+    Parameters
+    ----------
+    passages
+        What was watched, and what it is compared with.
+
+    References
+    ----------
+    docs/theory/responses.md.
+
+    Examples
+    --------
+    >>> from maglev.mechanics.integrate import integrate, prepare
+    >>> from maglev.simulation import track
+    >>> short = {"train": {"n_cars": 1}, "guideway": {"n_spans": 1}}
+    >>> config = Config.model_validate(short)
+    >>> passages = integrate(prepare(config, track(config)), np.array([config.gains.as_row]))
+    >>> bool(1.0 < responses(passages)["dynamic_coefficient"].value[0] < 1.2)
+    True
+    """
+    return {name: _FOUND[name](passages) for name in RESPONSES}
+
+
+def _of_girder(place: int, passages: Passages) -> Found:
+    return Found(
+        passages.girder[:, place],
+        passages.girder_time[:, place],
+        positive=passages.girder_positive[:, place],
+        negative=passages.girder_negative[:, place],
+    )
+
+
+def _of_cars(per_car: FloatArray, time: FloatArray | None = None) -> Found:
+    """The largest over the cars."""
+    worst = np.where(np.isnan(per_car), -1.0, per_car).argmax(axis=1)[:, None]
+
+    def of_worst(values: FloatArray) -> FloatArray:
+        return np.take_along_axis(values, worst, axis=1)[:, 0]
+
+    return Found(of_worst(per_car), None if time is None else of_worst(time), per_car)
+
+
+def _held(values: FloatArray, passages: Passages) -> FloatArray:
+    """Values of the passages that were completed."""
+    return np.where(passages.status == 0, values, np.nan)
+
+
+def _gap_excursion(kind: int, passages: Passages) -> Found:
+    reference = passages.gap_reference[:, kind]
+    closer = reference - passages.gap_min[:, kind]
+    return Found(_held(np.maximum(closer, passages.gap_max[:, kind] - reference), passages))
+
+
+def _current_share(kind: int, passages: Passages) -> Found:
+    share = passages.current_max[:, kind] / passages.current_limit[:, kind]
+    return Found(_held(share, passages))
+
+
+def _sperling(weighting: int, passages: Passages) -> Found:
+    return _of_cars(sperling_index(passages.weighted[:, weighting]))
+
+
+def _iso_2631(weighting: int, passages: Passages) -> Found:
+    return _of_cars(passages.weighted[:, weighting])
+
+
+def _dynamic_coefficient(passages: Passages) -> Found:
+    largest = passages.girder[:, 0]
+    return Found(largest / passages.static_deflection, passages.girder_time[:, 0])
+
+
+def _deflection_over_span(passages: Passages) -> Found:
+    return Found(passages.girder[:, 0] / passages.span_length, passages.girder_time[:, 0])
+
+
+_FOUND: Mapping[Response, Callable[[Passages], Found]] = {
+    "girder_displacement_z": partial(_of_girder, 0),
+    "girder_displacement_y": partial(_of_girder, 1),
+    "girder_acceleration_z": partial(_of_girder, 2),
+    "girder_acceleration_y": partial(_of_girder, 3),
+    "car_body_acceleration_z": lambda one: _of_cars(one.body_z, one.body_z_time),
+    "car_body_acceleration_y": lambda one: _of_cars(one.body_y, one.body_y_time),
+    "suspension_gap_excursion": partial(_gap_excursion, 0),
+    "guidance_gap_excursion": partial(_gap_excursion, 1),
+    "suspension_current_share": partial(_current_share, 0),
+    "guidance_current_share": partial(_current_share, 1),
+    "car_end_acceleration_z": lambda one: _of_cars(one.end_z, one.end_z_time),
+    "car_end_acceleration_y": lambda one: _of_cars(one.end_y, one.end_y_time),
+    "sperling_index_z": partial(_sperling, 0),
+    "sperling_index_y": partial(_sperling, 1),
+    "iso2631_rms_z": partial(_iso_2631, 2),
+    "iso2631_rms_y": partial(_iso_2631, 3),
+    "dynamic_coefficient": _dynamic_coefficient,
+    "deflection_over_span": _deflection_over_span,
+    "bearing_uplift": lambda one: Found(one.lift, one.lift_time),
+}
+"""How each response follows from what is watched."""
 
 
 def in_their_order(parts: Sequence[Passages], rows: Sequence[IntArray]) -> Passages:

@@ -70,7 +70,7 @@ def deflection(guideway: GuidewayModel, train: TrainModel, nose: npt.ArrayLike) 
 
 
 def largest_deflection(guideway: GuidewayModel, train: TrainModel, step: float = 0.5) -> float:
-    """Largest `deflection` [m] over all positions of the train.
+    """Largest `deflection` [m] over all positions of the train on the middle span.
 
     Parameters
     ----------
@@ -88,5 +88,8 @@ def largest_deflection(guideway: GuidewayModel, train: TrainModel, step: float =
     >>> 1e-3 < largest_deflection(span, car, step=4.0) < 2e-3
     True
     """
+    span, middle = guideway.parameters.span_length, midspan_of_middle_span(guideway)
     length = guideway.parameters.length + train.parameters.length
-    return float(deflection(guideway, train, np.arange(0.0, length + step, step)).max())
+    nose = np.arange(0.0, length + step, step)
+    on = (nose > middle - span / 2) & (nose < middle + span / 2 + train.parameters.length)
+    return float(deflection(guideway, train, nose[on]).max())

@@ -98,7 +98,7 @@ def limit_words(state: xr.Dataset) -> str:
     if response == "none":
         return str(state["definition"].item())
     value, unit = _shown(state)
-    return f"{RESPONSE_WORDS[response]} > {value:.6g} {unit}".rstrip()  # type: ignore[index]
+    return f"{RESPONSE_WORDS[response]} > {value:.6g} {unit}".rstrip()
 
 
 def _shown(state: xr.Dataset) -> tuple[float, str]:
@@ -106,7 +106,7 @@ def _shown(state: xr.Dataset) -> tuple[float, str]:
     response = str(state["state_response"].item())
     if response == "none":
         return np.nan, ""
-    scale, unit = SHOWN[RESPONSE_UNITS[response]]  # type: ignore[index]
+    scale, unit = SHOWN[RESPONSE_UNITS[response]]
     return scale * float(state["threshold"]), unit
 
 
@@ -138,9 +138,14 @@ def rows(found: xr.Dataset) -> list[dict[str, object]]:
                             if not key.startswith("beta")
                         },
                         **{key: number[key] for key in _NAMES if key.startswith("beta")},
-                        "verdict": verdict(
-                            number["probability_high"], number["probability_low"], number["target"]
-                        ),
+                        **{
+                            f"{prefix}verdict": verdict(
+                                number[f"{prefix}probability_high"],
+                                number[f"{prefix}probability_low"],
+                                number["target"],
+                            )
+                            for prefix in ("", "held_")
+                        },
                     }
                 )
     return made
@@ -196,7 +201,7 @@ def _by_method(found: xr.Dataset, state: int) -> list[xr.Dataset]:
 def _cell(one: xr.Dataset, prefix: str) -> str:
     """A probability with its interval, and whether it meets its target."""
     value, low, high = (float(one[f"{prefix}probability{end}"]) for end in _ENDS)
-    judged = "" if prefix else verdict(high, low, float(one["target"]))
+    judged = verdict(high, low, float(one["target"]))
     return " ".join(
         filter(None, (f"{per_cent(value)} [{per_cent(low)}, {per_cent(high)}]", judged))
     )
