@@ -1,8 +1,8 @@
 """Kriging: Gaussian processes with a Matérn 5/2 covariance and one length per input.
 
 scikit-learn supplies the covariance, its likelihood and the factorisation; gradient, leave-one-out,
-covariance and fast sums, which it lacks, are computed here from its factors, and so is the likelihood
-of many inputs, whose slope costs it an array of all pairs of samples for each input.
+covariance and fast sums, which it lacks, are computed here from its factors.  So is the likelihood
+of many inputs, for whose slope it keeps an array of all pairs of samples for each input.
 """
 
 from collections.abc import Callable
@@ -35,8 +35,8 @@ STARTS = (1.0, 3.0, 10.0)
 """Trial lengths, equal for all inputs; the search starts from the likeliest [-]; assumed."""
 
 SEARCHED_BY_LIBRARY = 4
-"""Largest number of inputs whose likelihood is that of scikit-learn.  That of more is ours, equal to
-1e-12 and up to ten times as fast (250 samples of 20 inputs: 2.4 against 27 ms); of fewer, the last
+"""Largest number of inputs whose likelihood is that of scikit-learn.  Ours, for more, is the same
+to 1e-10 and up to ten times as fast (250 samples of 20 inputs: 2.4 for 27 ms); for fewer, the last
 bits of published numbers hang on the library's sums."""
 
 BLOCK = 4096
