@@ -16,7 +16,7 @@ from maglev.fingerprint import code_of
 from maglev.parameters import WHY_NO_DESIGN
 from maglev.stage import flag, stages, summaries
 from maglev.stages.paper_and_ours import RESPONSE
-from maglev.stages.points import n_samples
+from maglev.stages.points import cost_words, n_samples
 from maglev.vocabulary import BASELINE, DESIGNED, METHODS, TRACK_PARTS
 
 min_version("9.0")

@@ -61,6 +61,7 @@ Array = npt.NDArray[np.float64]
 TARGET_RATIO, TARGET_STARTUP, TARGET_MINUTES, TARGET_THREADS = 200, 3.0, 10.0, 1.9
 TARGET_SPANS, TARGET_MEMORY = 4.0, 4.0
 TARGET_FACES, TARGET_ENDS, TARGET_LATE = 1.10, 1.00, 1.15
+TARGET_SAMPLE, TARGET_GUIDEWAY, TARGET_TWELVE = 1.15, 2.0, 4.0
 N_PASSAGES = 10_000
 
 BUSY = 0.5
@@ -338,9 +339,9 @@ def _repeat_train(n, vehicle, dt, train):
 
 
 @njit
-def _repeat_answer(n, spans, stretch, guideway):
+def _repeat_answer(n, spans, stretch, rates, guideway):
     for _ in range(n):
-        _answer(spans, stretch, guideway)
+        _answer(spans, stretch, rates, guideway)
 
 
 @njit
@@ -355,7 +356,7 @@ def _repeat_rails(n, spans, span, guideway, rails, turn, packed):
     for _ in range(n):
         _move_span(spans, span, 0, spans.stride, guideway.position, packed, rails.motion)
         _move_span(spans, span, 0, spans.stride, guideway.predicted, packed, rails.rate)
-        _load_span(spans, span, 0, spans.stride, rails, turn, guideway.force)
+        _load_span(spans, span, 0, spans.stride, rails, turn, packed, guideway.force)
 
 
 @njit
@@ -396,7 +397,8 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     scaled, link_pull = zeros(vehicle.scaled_dof.size), zeros(vehicle.link_start.size - 1)
     guideway, guideway_resting = motion(n_line, 1e-5), at_rest(n_line)
     rails = Rails(*(rows(3 * n_rail, 1e-5).reshape((3, n_rail, LANES)) for _ in range(3)))
-    turn, packed = zeros(spans.stride), zeros(spans.upright.size + spans.sideways.size)
+    turn, packed = zeros(spans.stride), zeros(spans.in_order.size)
+    rates = zeros(n_line)
     timing = packing.timing(system.config, 0)
     kinds = (system.suspension, system.guidance)
     outcome = packing.empty_outcome(system.train, kinds, timing)
@@ -415,7 +417,7 @@ def phases(system: integrate.System, per_step: float) -> list[Phase]:
     stepped = 0.0
     for stretch, share in enumerate(steps_of_stretches(system) / timing.n_steps):
         stepped += share * per_call(
-            500, lambda n, at=stretch: _repeat_answer(n, spans, at, guideway)
+            500, lambda n, at=stretch: _repeat_answer(n, spans, at, rates, guideway)
         )
         states += share * per_call(
             500, lambda n, at=stretch: _repeat_advance(n, spans, at, dt, guideway_resting)
@@ -628,6 +630,52 @@ def over(laws: list[Law], name: str, base: str) -> float:
     return cost[name] / cost[base]
 
 
+# ---------------------------------------------------------------- numbers of a sample's own
+
+TRAIN_KEYS = (
+    "train.car_body.mass",
+    "train.bogie.mass",
+    "train.suspension_magnet.mass",
+    "train.suspension_magnet.end_stiffness",
+    "train.air_spring.stiffness",
+    "irregularity.vertical.coefficient",
+)
+GUIDEWAY_KEYS = (
+    "guideway.girder.elastic_modulus",
+    "guideway.girder.density",
+    "guideway.bearing.vertical_stiffness",
+    "guideway.bearing.lateral_stiffness",
+    "guideway.damping_ratio",
+    "guideway.pier.density",
+)
+"""Twelve numbers that differ from sample to sample."""
+
+OWN_ROWS = 16
+"""Rows of samples that are timed: as many as share the assembly of their trains."""
+
+
+def own_numbers(config: Config, repeats: int) -> list[Law]:
+    """Passages with shared numbers, with trains and with guideways of their own; in turns."""
+    system, n_samples = integrate.prepare(config, track(config)), OWN_ROWS * LANES
+    spread = np.random.default_rng(4).uniform(0.9, 1.1, size=(12, n_samples))
+    values = {
+        key: config.number_at(key)[0] * column
+        for key, column in zip((*TRAIN_KEYS, *GUIDEWAY_KEYS), spread, strict=True)
+    }
+    sets = {"shared": {}, "sample": {key: values[key] for key in TRAIN_KEYS}, "guideway": values}
+    gains, best = gains_of(config, n_samples), dict.fromkeys(sets, np.inf)
+    for chosen in sets.values():  # compiles, and makes the basis
+        few = {key: column[:1] for key, column in chosen.items()}
+        integrate.integrate(system, gains[:1], values=few)
+    for _ in range(repeats):
+        for name, chosen in sets.items():
+            once = timed(lambda v=chosen: integrate.integrate(system, gains, values=v))
+            best[name] = min(best[name], once.process / n_samples)
+    for name, cost in best.items():
+        tell(f"  {name}: {cost:.4f} s a passage, {cost / best['shared']:.2f} of that of 'shared'")
+    return [Law(name, cost) for name, cost in best.items()]
+
+
 # ---------------------------------------------------------------- how the cost grows
 
 
@@ -758,6 +806,7 @@ class Results:
     bytes: tuple[int, int] = (0, 0)
     reference: Reference = Reference(0, 0, 0, 0)
     laws: list[Law] = field(default_factory=list)
+    own: list[Law] = field(default_factory=list)
     cars: list[Row] = field(default_factory=list)
     spans: list[Row] = field(default_factory=list)
     wall: float = 0.0
@@ -788,6 +837,8 @@ def measure(sizes: Sizes) -> Results:
     tell(f"  {results.per_passage:.4f} s a passage")
     tell("laws of control")
     results.laws = laws(config, sizes.law_repeats)
+    tell("numbers of a sample's own")
+    results.own = own_numbers(config, max(1, sizes.law_repeats // 2))
     tell("samples")
     results.samples = batches(config, sizes.samples)
     results.memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
@@ -875,6 +926,8 @@ def page(results: Results, sizes: Sizes) -> str:
     rate = results.phases and sum(p.operations for p in results.phases if p.seconds is not None)
     rate = rate * course(config).n_steps / results.per_passage
     base_wall = projected(results, results.per_passage, least.prepared)
+    own_cost = {law.name: law.cost for law in results.own}
+    twelve = projected(results, own_cost["guideway"], least.prepared)
     long_wall = projected(results, longer.cost, longer.prepared)
     n_most = results.samples[-1].size
     lines = [
@@ -964,6 +1017,24 @@ def page(results: Results, sizes: Sizes) -> str:
                         ("lag and delay", "neither", "pole, lag and delay", "pole", TARGET_LATE),
                     )
                 ),
+                *(
+                    [
+                        f"numbers of {what} of each sample's own",
+                        f"{over(results.own, name, 'shared'):.2f} times",
+                        f"≤ {target:.2f} times",
+                        judged(over(results.own, name, "shared"), target, least=False),
+                    ]
+                    for what, name, target in (
+                        ("train and track", "sample", TARGET_SAMPLE),
+                        ("the guideway, too,", "guideway", TARGET_GUIDEWAY),
+                    )
+                ),
+                [
+                    f"{N_PASSAGES:,} passages, 12 numbers of their own, 2 cores",
+                    f"{twelve / 60:.1f} min wall, projected",
+                    f"≤ {TARGET_TWELVE:g} min",
+                    judged(twelve / 60, TARGET_TWELVE, least=False),
+                ],
                 [
                     f"memory, {n_most} samples",
                     f"{results.memory / 1e9:.2f} GB",
@@ -1010,6 +1081,19 @@ def page(results: Results, sizes: Sizes) -> str:
         ),
         f"Lag {LAG * 1e3:g} ms, delay {DELAY * 1e3:g} ms.",
         "",
+        "## Numbers of a sample's own",
+        "",
+        "Numbers of the configuration that differ from sample to sample: of train and track "
+        f"({len(TRAIN_KEYS)}), and of the guideway, too ({len(GUIDEWAY_KEYS)} more).  Set-up "
+        f"included, {OWN_ROWS} rows.",
+        "",
+        *table(
+            ["own", "s a passage", "over shared"],
+            [
+                [law.name, f"{law.cost:.4f}", f"{over(results.own, law.name, 'shared'):.2f}"]
+                for law in results.own
+            ],
+        ),
         "## Reference solver",
         "",
         f"One sample, same configuration: {results.reference.resting * 1e3:.2f} ms a step before "

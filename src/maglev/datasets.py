@@ -721,6 +721,19 @@ def _study_table() -> dict[str, Variable]:
         "reliability_error": _number(
             level, "1", "reliability at the end of the passage less that of the extreme"
         ),
+        # sweeps
+        "setting": _words("setting", "case that a sweep has made"),
+        "swept_parameter": _words("swept_parameter", "dotted key that is swept"),
+        "swept_value": _number(
+            "setting swept_parameter", OF_PARAMETER, "swept value in SI, NaN where it is no number"
+        ),
+        "swept_text": _words("setting swept_parameter", "swept value as it is written"),
+        "extreme_at_mean": _number(
+            "setting response",
+            OF_RESPONSE,
+            "extreme at the mean, or median, of what is random, on the track of the seed",
+        ),
+        "status_at_mean": _code("setting", "end of that passage", STATUS),
         # what figures show of several files
         "curve": _number("curve", "1", "case and method of the curve, see flag_meanings", "int32"),
         "curve_value": _number("curve response cell", OF_RESPONSE, "extreme"),
@@ -739,6 +752,11 @@ def _study_table() -> dict[str, Variable]:
                 "1",
                 "probability that the extreme is exceeded or levitation lost",
             ),
+        ),
+        "curve_held_exceedance": _number(
+            "curve response cell",
+            "1",
+            "probability that the extreme is exceeded given that levitation holds",
         ),
         "curve_peak": _number("curve response", PER_RESPONSE, "largest value of the density"),
         "curve_peak_error": _number(
@@ -947,6 +965,17 @@ def _of_states(dims: str) -> dict[str, Variable]:
     }
 
 
+def _of_limits(dims: str) -> dict[str, Variable]:
+    """Limits, with their intervals and status, on the named dimensions."""
+    table: dict[str, Variable] = {}
+    for name, given in (("limit", ""), ("held_limit", " given that levitation holds")):
+        meaning = f"limit that is exceeded with the failure probability{given}"
+        table |= _with_ends(name, _number(dims, OF_RESPONSE, meaning))
+        table[f"{name}_status"] = _code(dims, f"status of the limit{given}", LIMIT_STATUS)
+    return table
+
+
+_LIMITS = (*_ends("limit", "held_limit"), "limit_status", "held_limit_status")
 _STATES = ("definition", "origin", "state_response", "threshold", "target")
 
 
@@ -1116,6 +1145,35 @@ LAYOUTS: Mapping[str, Layout] = {
                 "case method", "1", "number of runs of the model, 0 where there is none", "int32"
             )
         },
+    ),
+    "limits_table": Layout(
+        title="Limits of the extremes by every case and method",
+        variables=(*_LIMITS, *_ends("lost_probability"), "n_runs"),
+        own=_of_limits("case method response failure_probability")
+        | _with_ends(
+            "lost_probability", _number("case method", "1", "probability that levitation is lost")
+        )
+        | {
+            "n_runs": _number(
+                "case method", "1", "number of runs of the model, 0 where there is none", "int32"
+            )
+        },
+    ),
+    "sweep": Layout(
+        title="Limits, limit states and extremes at the mean along a swept key",
+        variables=(
+            "swept_value",
+            "swept_text",
+            *_LIMITS,
+            *_STATES,
+            *_ends("probability", "held_probability", "beta"),
+            "extreme_at_mean",
+            "status_at_mean",
+            "n_runs",
+        ),
+        own=_of_limits("setting response failure_probability")
+        | _of_states("setting limit_state")
+        | {"n_runs": _number("setting", "1", "number of runs of the model", "int32")},
     ),
     "accuracy": Layout(
         title="Accuracy of limits against number of runs",

@@ -14,3 +14,7 @@ class UserError(ValueError):
 
 class ConfigError(UserError):
     """A mistake in a configuration, told in one sentence that names the key or the file."""
+
+
+class StepTooLarge(UserError):
+    """A time step beyond the stability limit of a system."""

@@ -860,6 +860,13 @@ class Circuit(Parameters):
     delay: float = quantity(
         "s", "pure delay of the signal", "0 ms", source="A", confidence="L", minimum=0, below=0.1
     )
+    failed_magnets: int = Field(
+        0,
+        description="magnets of the kind that carry no current from the start, spread over the "
+        "train from its middle",
+        ge=0,
+        json_schema_extra={"unit": "", "source": "A", "confidence": "H"},
+    )
 
     @field_validator("group", mode="before")
     @classmethod
@@ -1711,6 +1718,12 @@ def _with_numbers(section: Parameters, nested: Mapping[str, Any], place: str) ->
     """Copy of a section with other numbers in SI, all of its checks made once."""
     fields = dict(section.__dict__)
     for name, value in nested.items():
+        inner = fields.get(name)
+        if isinstance(inner, Parameters) != isinstance(value, Mapping) or (
+            not isinstance(value, Mapping)
+            and (isinstance(inner, bool) or not isinstance(inner, int | float))
+        ):
+            raise UserError(f"{place}{name} is no number of the configuration")
         if isinstance(value, Mapping):
             value = _with_numbers(fields[name], value, f"{place}{name}.")
         fields[name] = value
@@ -1990,19 +2003,17 @@ class Config(Parameters):
         """
         nested: dict[str, Any] = {}
         for key, number in numbers.items():
-            self.number_at(key)
             *outer, last = key.split(".")
             inner = nested
             for name in outer:
                 inner = inner.setdefault(name, {})
             inner[last] = number
-        changed = {
-            name: _with_numbers(getattr(self, name), value, f"{place}{name}.")
-            if isinstance(value, Mapping)
-            else value
-            for name, value in nested.items()
-        }
-        config = self.model_copy(update=changed)
+        for name, value in nested.items():
+            section = self.__dict__.get(name)
+            if not isinstance(section, Parameters) or not isinstance(value, Mapping):
+                raise UserError(f"{place}{name} is no section of numbers of the configuration")
+            nested[name] = _with_numbers(section, value, f"{place}{name}.")
+        config = self.model_copy(update=nested)
         try:
             config._check_sections()
         except ValueError as error:
@@ -2062,6 +2073,33 @@ class Config(Parameters):
             raise UserError(f"{key} cannot be random: its value is no number, but {value!r}")
         extra = field.json_schema_extra
         return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
+
+    def swept_number(self, key: str, value: Any) -> tuple[float, str]:
+        """Number in SI, and its unit, that a value of a swept key stands for.
+
+        Parameters
+        ----------
+        key
+            Dotted key.
+        value
+            As a file writes it.
+
+        Returns
+        -------
+        number, unit
+            NaN and an empty text for a value that is no number, such as the group of a circuit.
+
+        Examples
+        --------
+        >>> Config().swept_number("passage.speed", "360 km/h")
+        (100.0, 'm/s')
+        """
+        first, *keys = key.split(".")
+        field, number = _field_at(_with_value(getattr(self, first), keys, value), keys)
+        if isinstance(number, bool) or not isinstance(number, int | float):
+            return math.nan, ""
+        extra = field.json_schema_extra
+        return float(number), str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
     def value_of(self, key: str) -> float:
         """Number at a dotted key, in SI."""

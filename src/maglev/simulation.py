@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from maglev import datasets, profiles
 from maglev.arrays import FloatArray, IntArray
-from maglev.errors import UserError
+from maglev.errors import StepTooLarge, UserError
 from maglev.fingerprint import file_hash
 from maglev.mechanics import integrate
 from maglev.mechanics import train as train_model
@@ -27,9 +27,10 @@ from maglev.mechanics.responses import (
     Passages,
     checked_gains,
     in_their_order,
+    not_judged,
     responses,
 )
-from maglev.mechanics.varied import checked_values, cost_of, equal_samples
+from maglev.mechanics.varied import beyond_the_basis, checked_values, cost_of, equal_samples
 from maglev.parameters import Config
 
 KEPT_TRACKS = 64
@@ -156,10 +157,15 @@ def simulate(
 
 @dataclass(frozen=True)
 class _Group:
-    """Samples that share a system: their numbers, its configuration, what else each has its own."""
+    """Samples that share a system.
+
+    Their numbers, its configuration, whether that is not the one given, and what else each has of
+    its own.
+    """
 
     rows: IntArray
     config: Config
+    anew: bool
     own: tuple[str, ...]
 
 
@@ -169,13 +175,24 @@ def _groups(
     """Samples in groups of equal values of what is built anew; all of it for the reference."""
     cost = cost_of(config, values)
     built = [key for key in values if cost[key] == "rebuild" or solver == "reference"]
-    built = list(values)
     own = tuple(key for key in values if key not in built)
+    anew = np.zeros(n_samples, dtype=bool)
+    for key in own:
+        if cost[key] == "guideway":
+            anew |= beyond_the_basis(config, key, values[key])
+    for sample in range(n_samples if own else 0):  # refused before anything is computed
+        numbers = {key: float(values[key][sample]) for key in values}
+        config.with_numbers(numbers, f"sample {sample}: ")
+    columns = [values[key] for key in built]
+    columns += [np.where(anew, values[key], 0.0) for key in own if cost[key] == "guideway"]
     found = []
-    for rows in equal_samples([values[key] for key in built], n_samples):
-        numbers = {key: float(values[key][rows[0]]) for key in built}
-        place = f"sample {rows[0]}: " if built else ""
-        found.append(_Group(rows, config.with_numbers(numbers, place) if built else config, own))
+    for rows in equal_samples([*columns, anew], n_samples):
+        whole = [key for key in own if anew[rows[0]] and cost[key] == "guideway"]
+        numbers = {key: float(values[key][rows[0]]) for key in [*built, *whole]}
+        place = f"sample {rows[0]}: "
+        of_group = config.with_numbers(numbers, place) if numbers else config
+        rest = tuple(key for key in own if key not in whole)
+        found.append(_Group(rows, of_group, bool(numbers), rest))
     return found
 
 
@@ -212,9 +229,16 @@ def _run(
         return passages, effort.attributes
     step = course(config).time_step
     every = max(1, int(HISTORY_INTERVAL / step * (1 + 1e-9))) if histories else 0
+    try:
+        system = _system(config, _track_file_hash(config))
+    except StepTooLarge:
+        if not group.anew or histories:  # the configuration's own step, or no histories to give
+            raise
+        return not_judged(config, rows.size), {}
     passages = integrate.integrate(
-        _system(config, _track_file_hash(config)),
+        system,
         gains[rows],
+        values={key: values[key][rows] for key in group.own},
         profile_of=None if seeds is None else _tracks_of(config, [seeds[k] for k in rows]),
         record_every=every,
         with_magnets=histories != "responses",

@@ -154,6 +154,49 @@ def limit_states(method="asm", *, lost=0.003, n=104):
     return _filled("limit_states", {"limit_state": len(names)}, **given)
 
 
+def sweep(speeds=(300, 400, 500), others=None, key="control.suspension.group"):
+    """Limits that grow with the speed, and with another key if its values are given."""
+    settings = [(one, other) for one in speeds for other in (others or [None])]
+    grown = np.array([one / speeds[0] for one, _ in settings])
+    grown *= np.array([1 + 0.2 * (others or [None]).index(other) for _, other in settings])
+    z = stats.norm.isf(LEVELS)
+    held = grown[:, None, None] * (CENTRE[:, None] + WIDTH[:, None] * z)
+    lost = np.minimum(1e-4 * grown**6, 0.5)
+    infinite = lost[:, None, None] > np.array(LEVELS) * np.ones((6, 1))
+    by_level = ("setting", "response", "failure_probability")
+    given = {
+        "limit_status": (by_level, np.where(infinite, 2, 0)),
+        "extreme_at_mean": (by_level[:2], grown[:, None] * CENTRE),
+        "swept_value": (
+            ("setting", "swept_parameter"),
+            [[one / 3.6, np.nan][: 1 + bool(others)] for one, _ in settings],
+        ),
+        "swept_text": (
+            ("setting", "swept_parameter"),
+            [[f"{one} km/h", str(other)][: 1 + bool(others)] for one, other in settings],
+        ),
+        "setting": ("setting", [f"fast_{k + 1}" for k in range(len(settings))]),
+        "swept_parameter": ("swept_parameter", ["passage.speed", key][: 1 + bool(others)]),
+        "n_runs": ("setting", np.full(len(settings), 104)),
+    }
+    states = limit_states()
+    for name in ("limit_state", "state_response", "threshold", "target", "definition"):
+        given[name] = (states[name].dims, states[name].to_numpy())
+    for end, by in (("", 0.0), ("_low", -0.02), ("_high", 0.02)):
+        given[f"held_limit{end}"] = (by_level, (1 + by) * held)
+        given[f"limit{end}"] = (by_level, np.where(infinite, np.inf, (1 + by) * held))
+        of = np.minimum(np.outer(lost, [1, 50, 10, 1, 60]), 1)
+        given[f"probability{end}"] = (("setting", "limit_state"), (1 + 10 * by) * of)
+    sizes = {
+        "setting": len(settings), "response": 6, "failure_probability": 3, "limit_state": 5,
+        "swept_parameter": 1 + bool(others),
+    }  # fmt: skip
+    made = _filled("sweep", sizes, **given)
+    units = ", ".join(["m/s", "1"][: 1 + bool(others)])
+    made["swept_value"].attrs["units_by_swept_parameter"] = units
+    return made.assign_attrs(method="asm")
+
+
 def accuracy(methods=("osm", "asm_paper", "asm")):
     """Errors that fall with the number of runs."""
     n_runs = np.tile(np.array([8, 12, 16, 24]), (len(methods), 1))
@@ -394,13 +437,19 @@ def study(folder, demonstration=False):
         "prediction": [one("prediction", prediction())],
         "density_by_method": by_method,
         "exceedance_by_method": by_method,
+        "density": by_method,
         "exceedance": [*by_method, *states],
+        "limits": [
+            one("limits", limits(lost=lost), method=method)
+            for method, lost in (("mcm", 0.003), ("osm", 0.0), ("asm", 0.003))
+        ],
         "density_by_gain": [*by_gain[0], *by_gain[2]],
         "limits_by_gain": [*by_gain[1], *by_gain[2]],
         "density_by_variation": [*by_variation[0], *by_variation[2]],
         "limits_by_variation": [*by_variation[1], *by_variation[2]],
         "density_by_control": [*by_control[0], *by_control[2]],
         "limits_by_control": [*by_control[1], *by_control[2]],
+        "sweep": [one("sweep", sweep(), "fast")],
         "sobol": [one("surrogate", surrogate(), method="asm")],
         "stability": [one("stability", stability()), baseline],
         "accuracy": [accurate],

@@ -15,17 +15,23 @@ from test_figures import VALIDATION
 from maglev import datasets
 from maglev.figures import (
     FIGURES,
+    accuracy,
     curves,
+    density,
     density_by_control,
+    density_by_method,
     draw,
     exceedance,
+    exceedance_by_method,
     in_time,
     labels,
     layouts_of,
+    limits,
     limits_by_control,
     prediction,
     stability,
     style,
+    sweep,
 )
 from maglev.vocabulary import PAPER_RESPONSES
 
@@ -50,6 +56,7 @@ def test_a_figure_of_the_study_is_drawn_with_its_numbers(tmp_path, files, name):
 
 OF_RESPONSES = [
     "training", "prediction", "density_by_method", "exceedance_by_method", "exceedance",
+    "density", "limits", "sweep",
     "density_by_gain", "limits_by_gain", "limits_by_variation", "sobol", "accuracy",
     "track_split", "tracks", "track_limits",
 ]  # fmt: skip
@@ -140,6 +147,96 @@ def test_peaks_are_compared_with_the_baseline_and_need_one(tmp_path, files):
             draw(name, files["density_by_method"][1:], tmp_path / "g")
 
 
+def test_the_exceedance_given_that_levitation_holds_stands_beside(files):
+    found = curves.densities(read(files["exceedance_by_method"], "density"))
+    held, lost = curves.held_exceedance(found), found["curve_lost_probability"]
+    assert_allclose(held + lost * (1 - held), found["curve_exceedance"], rtol=1e-12)
+    fig, plotted = exceedance_by_method.figure(read(files["exceedance_by_method"], "density"))
+    assert_allclose(plotted["curve_held_exceedance"], held)
+    for panel in fig.axes:
+        assert [text.get_text() for text in panel.texts] == ["P(lost) = 0.3 %"]
+        zorder = {line.get_label().split(",")[0]: line.get_zorder() for line in panel.get_lines()}
+        assert zorder["ASM-PDEM (ours)"] < min(zorder["MCM"], zorder["OSM-PDEM"])
+
+
+def test_both_motions_of_midspan_have_their_table_of_peaks(files):
+    fig, plotted = density_by_method.figure(read(files["density_by_method"], "density"))
+    titles = [axis.get_title(loc="left") for axis in fig.axes]
+    assert titles[:2] == ["(a) midspan displacement, vert.", "(b) midspan acceleration, vert."]
+    for response, table in ((0, fig.axes[2]), (2, fig.axes[3])):
+        words = [text.get_text() for text in table.texts]
+        scale = 1e3 if response == 0 else 1.0
+        peak = float(plotted["curve_peak"][0, response]) / scale
+        assert f"{peak:.3g}" in words
+        assert sum("± 10.0 %" in one for one in words) == 1
+
+
+def test_figures_of_a_case_need_no_baseline(files):
+    only = read(files["density"][-1:], "density")
+    fig, _ = density.figure(only)
+    assert [text.get_text() for text in fig.legends[0].get_texts()] == [
+        "ASM-PDEM (ours), 400 runs, lost 0.3 %"
+    ]
+    limits.figure(read(files["limits"][-1:], "limits"))
+    states = read(files["exceedance"][-1:], "limit_states")
+    exceedance.figure(only, states)
+
+
+def test_a_baseline_that_carries_no_limit_says_so(files):
+    few = read(files["limits"][:1], "limits")[0]
+    for name in ("limit", "held_limit"):
+        few[f"{name}_status"][:] = 1
+    fig, _ = limits.figure([few])
+    assert [text.get_text() for text in fig.axes[0].texts] == ["no limit: too few runs"]
+    errors = datasets.read(files["accuracy"][0], "accuracy")
+    errors["reference_held_limit"][0] = np.nan
+    fig, _ = accuracy.figure(errors)
+    assert [text.get_text() for text in fig.axes[0].texts] == ["MCM carries no limit: too few runs"]
+    assert fig.axes[1].get_lines()
+
+
+def test_a_sweep_has_a_line_for_each_level_or_for_each_value_of_its_second_key(files):
+    one = read(files["sweep"], "sweep")[0]
+    fig, _ = sweep.figure(one)
+    panel = fig.axes[1]
+    mean = panel.get_lines()[-1]
+    assert panel.get_xlabel() == "passage speed [km/h]"
+    assert_allclose(mean.get_xdata(), [300, 400, 500])
+    assert_allclose(mean.get_ydata(), 1e3 * one["extreme_at_mean"][:, 1])
+    assert len(panel.get_lines()) == 2 * len(study_files.LEVELS) + 1
+    states = [line.get_label() for line in fig.axes[6].get_lines()]
+    assert states == ["lost", "low", "high", "far", "either"]
+    two = datasets.describe(study_files.sweep(others=["pole", "ends"]))
+    fig, _ = sweep.figure(two.assign_attrs(config=one.attrs["config"]))
+    assert len(fig.axes) == 6 + 5
+    assert len(fig.axes[1].get_lines()) == 2 * 3
+    words = [text.get_text() for text in fig.legends[0].get_texts()]
+    assert words[:3] == ["suspension group: pole", "suspension group: ends", "limit at 0.1"]
+
+
+def test_a_swept_key_has_the_unit_in_which_it_is_written_and_a_speed_that_of_a_person():
+    def axis(key, values, texts, unit):
+        dims = ("setting", "swept_parameter")
+        units = {"units_by_swept_parameter": unit}
+        data = xr.Dataset(
+            {"swept_value": (dims, np.array(values)[:, None], units),
+             "swept_text": (dims, np.array(texts)[:, None])},
+            coords={"swept_parameter": [key]},
+        )  # fmt: skip
+        return sweep._axis(data, 0)
+
+    speed = axis("passage.speed", [100.0, 150.0], ["100 m/s", "540 km/h"], "m/s")
+    assert speed.label == "passage speed [km/h]"
+    assert_allclose(speed.places, [360, 540])
+    lag = axis("control.suspension.lag", [0.001, 0.002], ["1 ms", "2 ms"], "s")
+    assert lag.label == "suspension lag [ms]"
+    assert_allclose(lag.places, [1, 2])
+    mixed = axis("control.suspension.lag", [0.001, 0.002], ["1 ms", "0.002 s"], "s")
+    assert mixed.label == "suspension lag [s]"
+    group = axis("control.suspension.group", [np.nan] * 2, ["pole", "ends"], "")
+    assert (group.words, group.places.tolist()) == (("pole", "ends"), [0, 1])
+
+
 def read(paths, layout):
     return [datasets.read(path, layout) for path in paths]
 
@@ -218,8 +315,8 @@ def test_limits_far_from_all_others_are_noted_and_do_not_squeeze_them(files):
     paths = files["limits_by_control"]
     n = len(paths) // 2
     names = [f"{kind}limit{end}" for kind in ("", "held_") for end in ("", "_low", "_high")]
-    limits = second_far_away(paths[:n], "limits", names)
-    fig, _ = limits_by_control.figure(limits, read(paths[n:], "design"))
+    found = second_far_away(paths[:n], "limits", names)
+    fig, _ = limits_by_control.figure(found, read(paths[n:], "design"))
     panel = fig.axes[2]
     assert panel.get_ylim()[1] < study_files.CENTRE[2] + 0.7
     assert [text.get_text()[:14] for text in panel.texts] == ["off the panel:"]

@@ -136,7 +136,7 @@ def stepped_periods(step):
         motion = _kernels.at_rest(n)
         columns = np.arange(first, min(first + LANES, n))
         motion.position[columns, columns - first] = 1.0
-        _kernels._answer(spans, 0, motion)
+        _kernels._answer(spans, 0, np.zeros_like(motion.force), motion)
         operator[:, columns] = -motion.force[:, : columns.size]
     squares = np.sort(np.linalg.eigvals(operator).real)
     found = 2 / step * np.arcsin(step / 2 * np.sqrt(squares))
@@ -185,7 +185,7 @@ def test_coordinates_that_fall_quiet_are_left_at_rest():
     assert ends.size > 3
     for stretch in ends:
         arrays = Motion(*(np.ones((n, LANES)) for _ in range(5)))
-        _kernels._still(stretches, stretch, arrays)
+        _kernels._still(stretches, stretch, np.ones((n, LANES)), arrays)
         stilled = stretches.stilled[
             stretches.stilled_start[stretch] : stretches.stilled_start[stretch + 1]
         ]

@@ -27,20 +27,21 @@ GROUPS = ("pole", "ends", "half", "lumped")
 def first_pair(n_poles=None, *, guidance=False):
     """The first two magnets of a kind, right and left, with freedoms of their own; or one pole each
     that pulls as hard as all."""
-    rows = packing.magnet_rows(TRAIN, guidance=guidance)
+    rows = packing.magnet_rows(TRAIN, Circuit(), guidance=guidance)
     rows = rows._replace(
         x=rows.x[:1],
         number=np.array([[0, 1]]),
         translation=np.array([[0, 2]]),
         rotation=np.array([[1, 3]]),
-        static_force=rows.static_force[:1],
-        static_moment=rows.static_moment[:1],
-        constant=rows.constant[:1],
+        static_force=rows.static_force[:2],
+        static_moment=rows.static_moment[:2],
+        constant=rows.constant[: 2 * rows.offset.size],
+        current_max=rows.current_max[:2],
     )
     if n_poles == 1:
-        whole = np.ascontiguousarray(rows.constant.sum(axis=2, keepdims=True))
+        whole = rows.constant.reshape(2, -1).sum(axis=1)
         rows = rows._replace(
-            offset=np.zeros(1), arm=np.zeros(1), constant=whole, static_moment=np.zeros((1, 2))
+            offset=np.zeros(1), arm=np.zeros(1), constant=whole, static_moment=np.zeros(2)
         )
     return rows
 
@@ -56,6 +57,10 @@ def over_rigid_track(rows, track, rate):
         rise=np.zeros(0),
         rail=track[..., None].copy(),
         ramp=rate[..., None].copy(),
+        level=1.0,
+        sag=np.zeros(2 * n_steps),
+        sag_rise=np.zeros(2 * n_steps),
+        sagging=1.0,
     )
 
 
@@ -113,7 +118,7 @@ def all_lanes(gains):
 
 K_P, K_D = CONFIG.gains.as_row[:2]
 ONE = first_pair(1)
-FORCE = float(ONE.static_force[0, 0])
+FORCE = float(ONE.static_force[0])
 K_A = 0.4 * ONE.mass * ONE.current_reference / (2 * FORCE)  # adds 0.4 of the magnet's mass
 K_I = 20.0 * K_P
 HEIGHT, RISE = 0.5e-3, 20e-3  # m, s: the track's step
@@ -141,11 +146,11 @@ def solved(circuit, gains, duration):
     """The same magnet by a Runge-Kutta method of eighth order, the delay by the method of steps."""
     k_p, k_d, k_a, k_i = gains[0], gains[1], gains[4], gains[5]
     rest, gap, mass = ONE.current_reference, ONE.gap_reference, ONE.mass
-    constant = float(ONE.constant[0, 0, 0])
+    constant = float(ONE.constant[0])
     known = []  # (begin, end, dense solution) of the intervals that are solved
 
     def clipped(signal):
-        return min(max(rest + signal, 0.0), ONE.current_max)
+        return min(max(rest + signal, 0.0), ONE.current_max[0])
 
     def parts(time, state):
         track, rate = track_step(time)
@@ -355,8 +360,8 @@ def test_train_and_rails_pull_at_each_other_with_one_force_and_one_moment(group,
         sign = rows.outward[side]
         force = -stand.train.force[rows.translation[row, side]]
         # what the kernel leaves out: the static force, which the train's weight balances
-        static = sign * rows.static_force[row, side]
-        static_turn = sign * rows.static_moment[row, side]
+        static = sign * rows.static_force[2 * row + side]
+        static_turn = sign * rows.static_moment[2 * row + side]
         turn = -stand.train.force[rows.rotation[row, side]]
         on_train += force + static
         moment += (nose + rows.x[row]) * (force + static) + turned * (turn + static_turn)

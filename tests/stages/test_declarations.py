@@ -43,11 +43,19 @@ MAPPING = {
             "n_samples": 8,
             "random": NARROW,
         },
+        "fast": {
+            "n_spans": 1,
+            "random": {key: NARROW[key] for key in list(NARROW)[:1]},
+            "sweep": {"passage.speed": ["400 km/h", "430 km/h"]},
+        },
     },
 }
 
-OF_TRACK = ("track_runs", "track_split")
-"""Stages of a case with a random track."""
+CASE_OF = {"track_runs": "moving", "track_split": "moving", "sweep": "fast", "mean_run": "fast_1"}
+"""Case of a stage that is not made for every case."""
+
+SWEPT = ("fast_1", "fast_2")
+"""Cases that the sweep of `fast` makes."""
 
 NAMES = {
     "baseline_chunk": {"start": 0, "stop": 16},
@@ -81,6 +89,7 @@ class Chain:
     def many(self, role, by, case):
         methods = [one for one in ("mcm", "asm") if one in named(role).methods]
         n = n_samples(self.config, case or "validation")
+        cases = SWEPT if case == "fast" else ("validation",)
         return {
             ("method",): lambda: {one: self.made(role, case, one) for one in methods},
             ("part",): lambda: {one: self.made(role, case, part=one) for one in TRACK_PARTS},
@@ -90,9 +99,9 @@ class Chain:
                 )
                 for start in range(0, n, 16)
             },
-            ("case",): lambda: {"validation": self.made(role, "validation")},
+            ("case",): lambda: {one: self.made(role, one) for one in cases},
             ("case", "method"): lambda: {
-                ("validation", "asm"): self.made(role, "validation", "asm")
+                (one, "asm"): self.made(role, one, "asm") for one in cases
             },
         }[by]()
 
@@ -115,7 +124,7 @@ PAIRS = [
 
 @pytest.mark.parametrize(("name", "method"), PAIRS)
 def test_a_stage_finds_all_it_needs_in_what_it_has_declared(chain, name, method):
-    case = "moving" if name in OF_TRACK else "validation"
+    case = CASE_OF.get(name, "validation")
     made = chain.made(name, case, method, **NAMES.get(name, {}))
     datasets.check(made, named(name).layout)
 

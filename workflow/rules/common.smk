@@ -19,12 +19,19 @@ for case in CASES:
     ]
     if refused:
         logger.warning(f"cases.{case}: without {', '.join(refused)}: {WHY_NO_DESIGN}")
+    if words := cost_words(parameters, case):
+        logger.warning(f"cases.{case}.random: {words}")
 
 
 def methods_of(case: str, among: tuple[str, ...] = METHODS) -> list[str]:
     """Methods that a case names, of some."""
     named = parameters.cases[case].possible_methods if case in CASES else ()
     return [one for one in among if one in named]
+
+
+def swept_cases(case: str) -> list[str]:
+    """Cases that the sweep of a case makes, in its order."""
+    return [f"{case}_{number}" for number in parameters.cases[case].settings()]
 
 
 def checked_cases(every: bool) -> list[str]:
@@ -94,11 +101,20 @@ def names_of(stage, role: str, by: tuple[str, ...], wildcards) -> list[dict[str,
                 else methods_of(one, (BASELINE,))
             )
         ]
-    if stage.name == "limit_state_table":
+    if stage.name in ("limits_table", "limit_state_table"):
         return [
             {"case": one, "method": method}
-            for one in parameters.cases
+            for one in CASES
             for method in methods_of(one)
+        ]
+    if stage.name == "sweep":
+        return [
+            (
+                {"case": one, "method": methods_of(one)[-1]}
+                if "method" in by
+                else {"case": one}
+            )
+            for one in swept_cases(case)
         ]
     return {
         ("method",): lambda: [

@@ -129,6 +129,28 @@ DRAWN = {
 }
 
 
+def drawn_from(case: str):
+    """Function that finds the files of every figure of a case, by its name."""
+
+    def found(wildcards) -> dict[str, list[str]]:
+        return {name: files for name, (_, files) in figures_of_case(case).items()}
+
+    return found
+
+
+def words_of(case: str):
+    """Function that writes what `maglev figures` is given for all figures of a case."""
+
+    def written(wildcards, input, output) -> str:
+        folder = Path(output[0]).parent
+        return " + ".join(
+            " ".join([module, str(folder / name), *input[name]])
+            for name, (module, _) in figures_of_case(case).items()
+        )
+
+    return written
+
+
 for figure, (module, words, files) in DRAWN.items():
     if not files:
         continue
@@ -156,44 +178,33 @@ for figure, (module, words, files) in DRAWN.items():
             "maglev figure {params.module} {input} --out {params.out} 2> {log}"
 
 
-# figure of every case: what it shows, and the stages of whose methods it is drawn
-OF_CASE = {
-    "exceedance": (
-        "exceedances by every method, with the limit states",
-        ("density", "limit_states"),
-    ),
-}
-
-
-def of_every_method(stages):
-    """Function that finds the files of stages for each method of a case."""
-
-    def found(wildcards) -> list[str]:
-        return [file for one in stages for file in of_methods(one, wildcards.case)]
-
-    return found
-
-
-for figure, (words, names) in OF_CASE.items():
+# all figures of a case in one job, whichever of them is asked for: most of its time is spent once
+for case in parameters.cases:
 
     rule:
         name:
-            f"fig_{figure}"
+            f"figures_{case}"
         input:
-            of_every_method(names),
+            unpack(drawn_from(case)),
         output:
-            multiext(f"<results>/figures/{{case}}/{figure}", ".png", ".pdf", ".nc"),
+            [
+                f"<results>/figures/{case}/{name}.{ending}"
+                for name in figures_of_case(case)
+                for ending in ("png", "pdf", "nc")
+            ],
         log:
-            f"<logs>/figures/{{case}}/{figure}.log",
+            f"<logs>/figures/{case}.log",
         benchmark:
-            f"<benchmarks>/figures/{{case}}/{figure}.tsv"
+            f"<benchmarks>/figures/{case}.tsv"
         conda:
             "../envs/maglev.yaml"
         params:
-            out=subpath(output[0], strip_suffix=".png"),
-            code=code_of("figures", f"figures.{figure}"),
-            module=figure,
+            code=[
+                code_of("figures", f"figures.{module}")
+                for module, _ in figures_of_case(case).values()
+            ],
+            words=words_of(case),
         message:
-            f"Draw {words} of {{wildcards.case}}"
+            f"Draw the figures of {case}"
         shell:
-            "maglev figure {params.module} {input} --out {params.out} 2> {log}"
+            "maglev figures {params.words} 2> {log}"

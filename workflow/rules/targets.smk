@@ -69,7 +69,16 @@ def possible(stage, case: str) -> bool:
 def followed_cases() -> list[str]:
     """Cases whose responses are followed over the time of a passage."""
     stage = STAGES["density_in_time"]
-    return [case for case in parameters.cases if possible(stage, case)]
+    return [case for case in CASES if possible(stage, case)]
+
+
+def cases_of(stage) -> list[str]:
+    """Cases that a stage of each case is made for."""
+    if stage.name == "sweep":
+        return SWEEPS
+    if stage.name == "mean_run":
+        return [one for case in SWEEPS for one in swept_cases(case)]
+    return [case for case in CASES if possible(stage, case)]
 
 
 def results() -> list[str]:
@@ -83,26 +92,49 @@ def results() -> list[str]:
         wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
         if name == "control_study" and not CONTROL_CASES:
             continue
-        if name == "limit_state_table" and not parameters.cases:
+        if name in ("limits_table", "limit_state_table") and not CASES:
             continue
         if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
             files.append(file_of(name))
         if wildcards == {"case"}:
-            cases = [case for case in CASES if possible(stage, case)]
-            files += [file_of(name, case=case) for case in cases]
+            files += [file_of(name, case=case) for case in cases_of(stage)]
         if wildcards == {"case", "method"}:
             files += [file for case in CASES for file in of_methods(name, case)]
     return files
 
 
+def figures_of_case(case: str) -> dict[str, tuple[str, list[str]]]:
+    """Figures that a case has by its methods: name of the file, module and files it is drawn from.
+
+    A sweep has one figure, and the cases that it makes have theirs.
+    """
+    if case in SWEEPS:
+        return {"sweep": ("sweep", [file_of("sweep", case=case)])}
+
+    def of(*names: str) -> list[str]:
+        return [file for one in names for file in of_methods(one, case)]
+
+    figures = {
+        "density": ("density", of("density")),
+        "exceedance": ("exceedance", of("density", "limit_states")),
+        "limits": ("limits", of("limits")),
+    }
+    for method in methods_of(case, DESIGNED):
+        file = file_of("surrogate", case=case, method=method)
+        figures[f"sobol_{method}"] = ("sobol", [file])
+    if methods_of(case, (BASELINE,)):
+        file = file_of("baseline", case=case, method=BASELINE)
+        figures["scatter"] = ("scatter", [file])
+    if judged(case):
+        for name in ("accuracy", "prediction"):
+            figures[name] = (name, [file_of(name, case=case)])
+    return figures
+
+
 def figures_of_study() -> list[str]:
     """Figures that the cases and methods named in the configuration allow."""
-    return [
-        f"<results>/figures/{name}.png"
-        for name, (_, _, files) in DRAWN.items()
-        if files
-    ] + [
-        f"<results>/figures/{case}/{name}.png"
-        for name in OF_CASE
-        for case in parameters.cases
+    of_paper = [name for name, (_, _, files) in DRAWN.items() if files]
+    of_cases = [
+        f"{case}/{name}" for case in parameters.cases for name in figures_of_case(case)
     ]
+    return [f"<results>/figures/{name}.png" for name in (*of_paper, *of_cases)]

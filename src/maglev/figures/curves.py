@@ -96,6 +96,16 @@ def _gathered(
     return xr.Dataset(variables, coords={"curve": named(data), "response": data[0]["response"]})
 
 
+def held_exceedance(curves: xr.Dataset) -> xr.DataArray:
+    """Exceedance of the curves of `densities` given that levitation holds [-].
+
+    A passage that loses levitation exceeds every value, so that P(x | held) is
+    (P(x) - P(lost)) / (1 - P(lost)).
+    """
+    lost = curves["curve_lost_probability"]
+    return ((curves["curve_exceedance"] - lost) / (1.0 - lost)).clip(min=0.0)
+
+
 def body(curves: xr.Dataset, response: int, tail: float) -> tuple[float, float]:
     """Range of values that leaves out at most ``tail`` of each held density on either side."""
     low, high = [], []
@@ -255,6 +265,15 @@ def draw_limits(axis: Axes, x: FloatArray, at: xr.Dataset, look: Look) -> None:
                 textcoords="offset points",
                 arrowprops=arrow,
             )
+
+
+def levels_along(axis: Axes, levels: FloatArray) -> None:
+    """Let failure probabilities (level,) run along a panel, the rarest at its right end."""
+    axis.set_xscale("log")
+    axis.set_xlim(1.7 * levels.max(), levels.min() / 1.7)
+    axis.set_xticks(levels, [f"{level:g}" for level in levels], minor=False)
+    axis.minorticks_off()
+    axis.set_xlabel("failure probability [-]")
 
 
 def limits_apart(at: xr.Dataset) -> BoolArray:

@@ -56,13 +56,13 @@ def figure(
         for number, name in enumerate(methods):
             one = at.isel(curve=number)
             value = shown.scale * one["curve_value"]
-            look = labels.METHOD_STYLE[name]
+            colour = labels.METHOD_STYLE[name]["color"]
             band = [one[f"curve_exceedance{end}"].clip(min=floor) for end in _ENDS[1:]]
-            axis.fill_between(value, band[0], band[1], color=look["color"], alpha=0.12, lw=0)
+            axis.fill_between(value, band[0], band[1], color=colour, alpha=0.12, lw=0)
             axis.plot(
                 value,
                 one["curve_exceedance"].where(one["curve_exceedance"] > 0),
-                **look,
+                **labels.method_line(name),
                 label=labels.of_runs(
                     labels.PDEM[name], one["curve_n_runs"], one["curve_lost_probability"]
                 ),

@@ -132,6 +132,26 @@ METHOD_STYLE: dict[str, style.Look] = {
 }
 """Their lines; the dashes tell them apart without colour."""
 
+_OVER: dict[str, style.Look] = {
+    "mcm": {"lw": 1.1, "zorder": 2.2},
+    "osm": {"lw": 1.0, "zorder": 2.4},
+    "asm_paper": {"lw": 1.0, "zorder": 2.3},
+    "asm": {"lw": 2.6, "alpha": 0.55, "zorder": 2.1},
+}
+"""What lets lines of several methods lie on each other: a broad pale one below, dashes on top."""
+
+
+def method_line(name: str) -> style.Look:
+    """Line style of a method in a panel where the lines of several methods lie on each other.
+
+    Examples
+    --------
+    >>> method_line("mcm")["color"]
+    '#000000'
+    """
+    return {**METHOD_STYLE[name], **_OVER[name]}
+
+
 METHOD_MARKER = {"mcm": "s", "osm": "s", "asm_paper": "^", "asm": "o"}
 """Their markers."""
 

@@ -53,12 +53,8 @@ def figure(
             words_of = ", ".join(f"{value:.3g}" for value in values)
             style.note(axis, f"off the panel: {words_of}", color=look["color"])
             axis.set_ymargin(0.2)  # the note stands above the curves
-        axis.set_xscale("log")
-        axis.set_xlim(1.7 * levels.max(), levels.min() / 1.7)
-        axis.set_xticks(levels, [f"{level:g}" for level in levels], minor=False)
-        axis.minorticks_off()
+        curves.levels_along(axis, levels)
         axis.set_ylabel(f"limit, {shown.axis}")
-        axis.set_xlabel("failure probability [-]")
     if curves.differ(found):
         handles.append(Line2D([], [], ls="", marker="o", ms=3.5, mfc="white", color=style.QUIET))
         words.append("filled: of all passages; hollow, line: given that levitation holds")

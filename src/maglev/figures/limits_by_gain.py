@@ -48,12 +48,8 @@ def figure(
         for number, look in enumerate(looks):
             apart = 1.06 ** (number - 0.5 * (len(looks) - 1))
             curves.draw_limits(axis, levels * apart, at.isel(curve=number), look)
-        axis.set_xscale("log")
-        axis.set_xlim(1.7 * levels.max(), levels.min() / 1.7)
-        axis.set_xticks(levels, [f"{level:g}" for level in levels], minor=False)
-        axis.minorticks_off()
+        curves.levels_along(axis, levels)
         axis.set_ylabel(f"limit, {shown.axis}")
-        axis.set_xlabel("failure probability [-]")
     if curves.differ(found):
         handles.append(Line2D([], [], ls="", marker="o", ms=3.5, mfc="white", color=style.QUIET))
         words.append("filled: of all passages; hollow, line: given that levitation holds")

@@ -38,6 +38,7 @@ class Look(TypedDict, total=False):
     alpha: float
     rasterized: bool
     label: str
+    zorder: float
 
 
 @contextmanager
@@ -167,7 +168,11 @@ def mark_demonstration(figure: Figure) -> None:
 
 
 def save(figure: Figure, out: Path) -> None:
-    """Write PNG and PDF, without the time of writing so that equal figures are equal files."""
+    """Write PNG and PDF, without the time of writing so that equal figures are equal files.
+
+    The panels are laid out once, for the PNG, and keep their places in the PDF.
+    """
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out.with_name(f"{out.name}.png"), dpi=300, metadata={"Software": None})
+    figure.set_layout_engine(None)
     figure.savefig(out.with_name(f"{out.name}.pdf"), metadata={"CreationDate": None})

@@ -1,8 +1,8 @@
 """Compiled: the passage of a row of samples, step by step.
 
 Kernels take arrays and floats, write where they are told and check nothing: `integrate` has
-checked.  All samples of a row share the train's position and the matrices; gains
-and, where asked for, tracks differ.
+checked.  All samples of a row share the train's place and what tables of the run stand on; the
+gains differ, the track may, and so may the train (`maglev.mechanics.lanes.own`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,30 @@ from maglev.mechanics._records import (
     Rails,
     Watch,
 )
-from maglev.mechanics._rows import gather, project, transform, transform_both, weighted_sum, zeros
-from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, store
+from maglev.mechanics._rows import (
+    add_terms,
+    change,
+    change_back,
+    gather,
+    own_sum,
+    project,
+    transform,
+    transform_both,
+    weighted_sum,
+    zeros,
+)
+from maglev.mechanics.lanes import (
+    LANES,
+    choose,
+    entry,
+    fma,
+    has_rows,
+    load,
+    maximum,
+    own,
+    own_of,
+    store,
+)
 
 
 @kernel()
@@ -63,8 +85,8 @@ def _advance_train(vehicle, dt, train):
     The velocity that the forces see is predicted from the last two accelerations.
     """
     half = 0.5 * dt
-    for i in range(vehicle.inverse_mass.size):
-        a = load(train.force, i) * entry(vehicle.inverse_mass, i)
+    for i in range(train.force.shape[0]):
+        a = load(train.force, i) * own_of(vehicle.inverse_mass, vehicle.mass_number, i)
         v = fma(a, dt, load(train.velocity, i))
         store(train.position, i, fma(v, dt, load(train.position, i)))
         store(train.predicted, i, fma(load(train.before, i), -half, fma(a, dt, v)))
@@ -77,20 +99,24 @@ def _links(vehicle, train, scaled, pull):
     """Set the train's forces to those of its springs and dampers."""
     for k in range(vehicle.scaled_dof.size):
         i = entry(vehicle.scaled_dof, k)
-        along = load(train.position, i) * entry(vehicle.scaled_stiffness, k)
+        stiffness = own_of(vehicle.scaled_stiffness, vehicle.stiffness_number, k)
+        along = load(train.position, i) * stiffness
         rate = load(train.predicted, i)
-        store(scaled, k, fma(rate, entry(vehicle.scaled_damping, k), along))
+        damping = own_of(vehicle.scaled_damping, vehicle.damping_number, k)
+        store(scaled, k, fma(rate, damping, along))
     coefficient, start = vehicle.link_coefficient, vehicle.link_start
     none = load(train.position, 0) * 0.0
     for i in range(start.size - 1):
         first, last = entry(start, i), entry(start, i + 1)
         total = weighted_sum(coefficient, vehicle.link_scaled, first, last, scaled, none)
         store(pull, i, total)
+    add_terms(vehicle.own_link, 1.0, scaled, pull)
     coefficient, start = vehicle.pull_coefficient, vehicle.pull_start
     for i in range(start.size - 1):
         first, last = entry(start, i), entry(start, i + 1)
         total = weighted_sum(coefficient, vehicle.pull_link, first, last, pull, none)
         store(train.force, i, none - total)
+    add_terms(vehicle.own_pull, -1.0, pull, train.force)
 
 
 @kernel()
@@ -101,6 +127,16 @@ def _move_span(spans, span, begin, end, source, packed, motion):
     out, out_end = spans.sideways_start[span], spans.sideways_start[span + 1]
     gather(source, spans.upright, up, up_end, packed, 0)
     gather(source, spans.sideways, out, out_end, packed, up_end - up)
+    if has_rows(spans.change):
+        n, m = spans.rail_z.shape[0], spans.rail_y.shape[0]
+        changed, place = up_end - up + out_end - out, spans.change_start[span]
+        change(spans.change, place, n, up_end - up, packed, 0, packed, changed)
+        place += n * (up_end - up)
+        change(
+            spans.change, place, m, out_end - out, packed, up_end - up, packed, changed + n
+        )  # fmt: skip
+        gather(packed, spans.in_order, changed, changed + n + m, packed, 0)
+        up, up_end, out, out_end = 0, n, 0, m
     transform_both(
         spans.rail_z, up, up_end, spans.rail_roll, out, out_end, packed, begin, end,
         motion[0], motion[1], at,
@@ -122,7 +158,7 @@ def _move_rails(spans, first, last, tail, nose, guideway, packed, rails):
 
 
 @kernel()
-def _load_span(spans, span, begin, end, rails, turn, force):
+def _load_span(spans, span, begin, end, rails, turn, packed, force):
     """Add the forces on a span's rails to the forces on its coordinates.
 
     Leaves the sum of right and left in ``rails.force[0]`` and the difference in ``turn``.
@@ -134,6 +170,19 @@ def _load_span(spans, span, begin, end, rails, turn, force):
         right, left = load(rails.force[0], at + k), load(rails.force[1], at + k)
         store(rails.force[0], at + k, right + left)
         store(turn, k, right - left)
+    if has_rows(spans.change):
+        n, m = spans.rail_z.shape[0], spans.rail_y.shape[0]
+        for k in range(n + m):
+            store(packed, k, 0.0)
+        order, of_y = spans.in_order, packed[n:]
+        project(spans.rail_z, order, 0, n, begin, end, rails.force[0], at, packed)
+        project(spans.rail_roll, order, 0, m, begin, end, turn, 0, of_y)
+        project(spans.rail_y, order, 0, m, begin, end, rails.force[2], at, of_y)
+        place = spans.change_start[span]
+        change_back(spans.change, place, n, up_end - up, packed, 0, spans.upright, up, force)
+        place += n * (up_end - up)
+        change_back(spans.change, place, m, out_end - out, packed, n, spans.sideways, out, force)
+        return
     project(spans.rail_z, spans.upright, up, up_end, begin, end, rails.force[0], at, force)
     project(spans.rail_roll, spans.sideways, out, out_end, begin, end, turn, 0, force)
     project(spans.rail_y, spans.sideways, out, out_end, begin, end, rails.force[2], at, force)
@@ -146,15 +195,23 @@ def _left_out_at_bearings(spans, begin, end, force, turn, across, at, watch):
     for side in range(2):
         mean, half = none, none
         for k in range(begin, end):
-            mean = fma(load(force, at + k), spans.bearing_rest[3 * side, k], mean)
-            half = fma(load(turn, k), spans.bearing_rest[3 * side + 1, k], half)
-            half = fma(load(across, at + k), spans.bearing_rest[3 * side + 2, k], half)
+            mean = fma(
+                load(force, at + k), own(spans.bearing_rest, 3 * side * spans.stride + k), mean
+            )
+            half = fma(
+                load(turn, k), own(spans.bearing_rest, (3 * side + 1) * spans.stride + k), half
+            )
+            half = fma(
+                load(across, at + k),
+                own(spans.bearing_rest, (3 * side + 2) * spans.stride + k),
+                half,
+            )
         store(watch.bearing, 2 * side, mean)
         store(watch.bearing, 2 * side + 1, half)
 
 
 @kernel()
-def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway, watch):
+def _load_guideway(spans, first, last, tail, nose, rails, turn, packed, guideway, watch):
     """Transfer the forces on the rails under the train to the guideway's coordinates.
 
     Returns the midspan displacement, z and y, that these forces cause in the left-out modes.
@@ -165,13 +222,14 @@ def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway, watch)
         store(watch.bearing, k, 0.0)
     for span in range(first, last + 1):
         begin, end = _covered(spans, span, tail, nose)
-        _load_span(spans, span, begin, end, rails, turn, guideway.force)
+        _load_span(spans, span, begin, end, rails, turn, packed, guideway.force)
         if span == spans.middle:
             at = span * spans.stride
             for k in range(begin, end):
-                rest_z = fma(load(rails.force[0], at + k), spans.rest[0, k], rest_z)
-                rest_y = fma(load(turn, k), spans.rest[1, k], rest_y)
-                rest_y = fma(load(rails.force[2], at + k), spans.rest[2, k], rest_y)
+                roll, y = spans.stride + k, 2 * spans.stride + k
+                rest_z = fma(load(rails.force[0], at + k), own(spans.rest, k), rest_z)
+                rest_y = fma(load(turn, k), own(spans.rest, roll), rest_y)
+                rest_y = fma(load(rails.force[2], at + k), own(spans.rest, y), rest_y)
             _left_out_at_bearings(
                 spans, begin, end, rails.force[0], turn, rails.force[2], at, watch
             )
@@ -179,10 +237,11 @@ def _load_guideway(spans, first, last, tail, nose, rails, turn, guideway, watch)
 
 
 @kernel()
-def _still(stretches, stretch, guideway):
+def _still(stretches, stretch, rates, guideway):
     """Bring the coordinates that a new stretch no longer steps to rest."""
     for k in range(stretches.stilled_start[stretch], stretches.stilled_start[stretch + 1]):
         i = stretches.stilled[k]
+        store(rates, i, 0.0)
         for state in guideway:
             store(state, i, 0.0)
 
@@ -203,10 +262,10 @@ def _advance_guideway(stretches, stretch, dt, guideway):
 
 
 @kernel()
-def _answer(spans, stretch, guideway):
+def _answer(spans, stretch, scaled, guideway):
     """Turn the forces on the stepped coordinates into accelerations, in place."""
     x, velocity, force = guideway.position, guideway.predicted, guideway.force
-    n_modes, stretches = spans.square.size, spans.stretches
+    n_modes, stretches = spans.carried_start.size - 1, spans.stretches
     start, tops, stop = (
         stretches.start[stretch],
         stretches.tops[stretch],
@@ -214,16 +273,27 @@ def _answer(spans, stretch, guideway):
     )
     none = load(force, 0) * 0.0
     damping, column = spans.damping, spans.damping_column
+    if has_rows(spans.damping_root):
+        velocity = scaled
+        for n in range(start, stop):
+            i = entry(stretches.stepped, n)
+            root = own_of(spans.damping_root, spans.root_number, i)
+            store(scaled, i, load(guideway.predicted, i) * root)
     for n in range(start, stop):
         i = entry(stretches.stepped, n)
         if n < tops:
-            back = load(x, i) * entry(spans.square, i)
+            back = load(x, i) * own_of(spans.square, spans.mode_number, i)
         else:  # modes come first
             first, last = entry(stretches.taken_from, n), entry(stretches.taken_to, n)
-            back = weighted_sum(spans.taken, spans.taken_mode, first, last, force, none)
+            number = spans.taken_number
+            back = own_sum(spans.taken, number, spans.taken_mode, first, last, force, none)
             first = entry(spans.stiffness_start, i - n_modes)
             last = entry(spans.stiffness_start, i - n_modes + 1)
-            back = weighted_sum(spans.stiffness, spans.stiffness_top, first, last, x, back)
+            number = spans.stiffness_number
+            back = own_sum(spans.stiffness, number, spans.stiffness_top, first, last, x, back)
+        elastic = back
+        if has_rows(spans.damping_root):
+            back = none
         drag = none
         first, last = entry(stretches.damping_from, n), entry(stretches.damping_to, n)
         for k in range(first, last - 1, 2):  # two sums: neither waits for the other
@@ -231,26 +301,32 @@ def _answer(spans, stretch, guideway):
             back = fma(load(velocity, entry(column, k + 1)), entry(damping, k + 1), back)
         if (last - first) % 2 == 1:
             drag = fma(load(velocity, entry(column, last - 1)), entry(damping, last - 1), drag)
-        store(force, i, load(force, i) - (back + drag))
+        if has_rows(spans.damping_root):
+            root = own_of(spans.damping_root, spans.root_number, i)
+            store(force, i, load(force, i) - fma(back + drag, root, elastic))
+        else:
+            store(force, i, load(force, i) - (back + drag))
     for n in range(tops, stop):
         i = entry(stretches.stepped, n)
         first, last = entry(stretches.factor_start, n), entry(stretches.factor_start, n + 1)
-        total = load(force, i) - weighted_sum(
-            stretches.factor, stretches.factor_top, first, last, force, none
+        total = load(force, i) - own_sum(
+            stretches.factor, spans.in_order, stretches.factor_top, first, last, force, none
         )
-        store(force, i, total * entry(stretches.factor_inverse, n))
+        store(force, i, total * own(stretches.factor_inverse, n))
     for n in range(stop - 1, tops - 1, -1):
         i = entry(stretches.stepped, n)
-        total = load(force, i) * entry(stretches.factor_inverse, n)
+        total = load(force, i) * own(stretches.factor_inverse, n)
         store(force, i, total)
         for k in range(entry(stretches.factor_start, n), entry(stretches.factor_start, n + 1)):
             at = entry(stretches.factor_top, k)
-            store(force, at, load(force, at) - total * entry(stretches.factor, k))
+            store(force, at, load(force, at) - total * own(stretches.factor, k))
     for n in range(start, tops):
         i = entry(stretches.stepped, n)
         first, last = entry(spans.carried_start, i), entry(spans.carried_start, i + 1)
-        along = weighted_sum(spans.carried, spans.carried_top, first, last, force, none)
-        store(force, i, (load(force, i) - along) * entry(spans.response, i))
+        number = spans.carried_number
+        along = own_sum(spans.carried, number, spans.carried_top, first, last, force, none)
+        response = own_of(spans.response, spans.mode_number, i)
+        store(force, i, (load(force, i) - along) * response)
 
 
 @kernel()
@@ -335,7 +411,7 @@ def _watch_midspan(spans, timing, step, direction, rest, guideway, watch, outcom
     n_columns = spans.output_column.size
     for k in range(n_columns):
         column = entry(spans.output_column, k)
-        share = entry(spans.midspan, direction * n_columns + k)
+        share = own(spans.midspan, direction * n_columns + k)
         shift = fma(load(guideway.position, column), share, shift)
         raw = fma(load(guideway.force, column), share, raw)
     change = rest - load(watch.left_out, 3 * direction)
@@ -369,8 +445,8 @@ def _watch_bearings(spans, timing, step, place, guideway, watch, outcome):
         mean, half = load(watch.bearing, 2 * side), load(watch.bearing, 2 * side + 1)
         for k in range(n_columns):
             motion = load(guideway.position, entry(spans.output_column, k))
-            mean = fma(motion, entry(spans.bearing, 2 * side * n_columns + k), mean)
-            half = fma(motion, entry(spans.bearing, (2 * side + 1) * n_columns + k), half)
+            mean = fma(motion, own(spans.bearing, 2 * side * n_columns + k), mean)
+            half = fma(motion, own(spans.bearing, (2 * side + 1) * n_columns + k), half)
         higher = mean + maximum(half, -1.0 * half)
         lift = higher if side == 0 else maximum(lift, higher)
     time, dt = step * timing.time_step, timing.time_step
@@ -390,13 +466,14 @@ def _watch_cars(vehicle, timing, step, train, watch, outcome):
     record = timing.record_every > 0 and step % timing.record_every == 0
     for car in range(n_cars):
         vertical, lateral = vehicle.body_z[car], vehicle.body_y[car]
-        up = load(train.force, vertical) * vehicle.inverse_mass[vertical]
-        across = load(train.force, lateral) * vehicle.inverse_mass[lateral]
+        mass, number = vehicle.inverse_mass, vehicle.mass_number
+        up = load(train.force, vertical) * own_of(mass, number, vertical)
+        across = load(train.force, lateral) * own_of(mass, number, lateral)
         _keep_peak(outcome, watch, 4 + car, up, step * dt, dt)
         _keep_peak(outcome, watch, 4 + n_cars + car, across, step * dt, dt)
         pitch, yaw = vehicle.body_pitch[car], vehicle.body_yaw[car]
-        turn = load(train.force, pitch) * (vehicle.inverse_mass[pitch] * vehicle.end_distance)
-        swing = load(train.force, yaw) * (vehicle.inverse_mass[yaw] * vehicle.end_distance)
+        turn = load(train.force, pitch) * (own_of(mass, number, pitch) * vehicle.end_distance)
+        swing = load(train.force, yaw) * (own_of(mass, number, yaw) * vehicle.end_distance)
         end_z = maximum(up, -1.0 * up) + maximum(turn, -1.0 * turn)
         end_y = maximum(across, -1.0 * across) + maximum(swing, -1.0 * swing)
         _keep_peak(outcome, watch, 4 + 2 * n_cars + car, end_z, step * dt, dt)
@@ -425,11 +502,11 @@ def _note_lost(timing, watch, outcome, time):
             continue
         for magnet in range(watch.magnet_min.shape[0]):
             low, high = watch.magnet_min[magnet, lane], watch.magnet_max[magnet, lane]
-            if low > timing.gap_contact and high < timing.gap_lost:
+            if low > timing.gap_contact[lane] and high < timing.gap_lost[lane]:
                 continue
-            if low <= timing.gap_contact:
+            if low <= timing.gap_contact[lane]:
                 outcome.status[lane] = CONTACT
-            elif high >= timing.gap_lost:
+            elif high >= timing.gap_lost[lane]:
                 outcome.status[lane] = GAP_LOST
             else:
                 outcome.status[lane] = NOT_FINITE
@@ -451,7 +528,7 @@ def _all_lost(timing, watch, outcome, time):
     for lane in range(LANES):
         low = min(outcome.gap_min[0, lane], outcome.gap_min[1, lane])
         high = max(outcome.gap_max[0, lane], outcome.gap_max[1, lane])
-        if not (low > timing.gap_contact and high < timing.gap_lost):
+        if not (low > timing.gap_contact[lane] and high < timing.gap_lost[lane]):
             return _note_lost(timing, watch, outcome, time) == 0
     return False
 
@@ -479,11 +556,12 @@ def cross(
     """
     n_cars, n_magnets = vehicle.body_z.size, 2 * (suspension.x.size + guidance.x.size)
     dt, stretches = timing.time_step, spans.stretches
-    train = at_rest(vehicle.inverse_mass.size)
-    guideway = at_rest(spans.square.size + spans.stiffness_start.size - 1)
+    train = at_rest(vehicle.pull_start.size - 1)
+    guideway = at_rest(spans.carried_start.size + spans.stiffness_start.size - 2)
+    rates = zeros(guideway.force.shape[0])
     rails = _straight_rails(spans)
     scaled, pull = zeros(vehicle.scaled_dof.size), zeros(vehicle.link_start.size - 1)
-    packed, turn = zeros(spans.upright.size + spans.sideways.size), zeros(spans.stride)
+    packed, turn = zeros(spans.in_order.size), zeros(spans.stride)
     lifting = empty_magnet(suspension, suspension_law)
     guiding = empty_magnet(guidance, guidance_law)
     lifting_circuits = circuits_at_rest(suspension, suspension_law)
@@ -501,7 +579,7 @@ def cross(
         _advance_train(vehicle, dt, train)
         while stretch + 1 < stretches.first_step.size and step >= stretches.first_step[stretch + 1]:
             stretch += 1
-            _still(stretches, stretch, guideway)
+            _still(stretches, stretch, rates, guideway)
         if stretch >= 0:
             _advance_guideway(stretches, stretch, dt, guideway)
         _move_rails(spans, first, last, tail, nose, guideway, packed, rails)
@@ -515,10 +593,10 @@ def cross(
             guiding, guiding_circuits, record, watch, outcome,
         )  # fmt: skip
         rest_z, rest_y = _load_guideway(
-            spans, first, last, tail, nose, rails, turn, guideway, watch
+            spans, first, last, tail, nose, rails, turn, packed, guideway, watch
         )
         if stretch >= 0:
-            _answer(spans, stretch, guideway)
+            _answer(spans, stretch, rates, guideway)
         _watch_midspan(spans, timing, step, 0, rest_z, guideway, watch, outcome)
         _watch_midspan(spans, timing, step, 1, rest_y, guideway, watch, outcome)
         _watch_bearings(spans, timing, step, 4 + 4 * n_cars, guideway, watch, outcome)

@@ -11,7 +11,19 @@ from __future__ import annotations
 from maglev.compiled import kernel
 from maglev.mechanics._records import Circuits, Magnet
 from maglev.mechanics._rows import zeros
-from maglev.mechanics.lanes import LANES, choose, entry, fma, load, maximum, minimum, store
+from maglev.mechanics.lanes import (
+    LANES,
+    choose,
+    entry,
+    fma,
+    load,
+    maximum,
+    met,
+    minimum,
+    own,
+    own_of,
+    store,
+)
 
 
 @kernel()
@@ -26,9 +38,12 @@ def circuits_at_rest(rows, law):
     """Circuits at rest, with the currents that carry the train."""
     n = 2 * rows.x.size * law.n_circuits
     current, command = zeros(n), zeros(n)
+    none = load(current, 0)
     for k in range(n):
-        store(current, k, rows.current_reference)
-        store(command, k, rows.current_reference)
+        most = own_of(rows.current_max, rows.current_number, k // law.n_circuits)
+        at_rest = minimum(none + own(rows.current_reference, 0), most)
+        store(current, k, at_rest)
+        store(command, k, at_rest)
     n_signals = law.ring * n if law.delays else 1
     signal = zeros(n_signals).reshape((max(1, n_signals // n), -1, LANES))
     return Circuits(current, command, zeros(n), zeros(n), signal)
@@ -53,8 +68,10 @@ def _look(footprints, rows, law, row, side, step, train, rails, magnet):
         first = entry(footprints.first, here)
         begin, end = entry(footprints.start, here), entry(footprints.start, here + 1)
         rail = load(footprints.rail, at) if own_track else none + entry(footprints.rail, at)
+        rail = met(rail, footprints.level, entry(footprints.sag, at), footprints.sagging)
         if entry(law.senses, p) > 0:
             rise = load(footprints.ramp, at) if own_track else none + entry(footprints.ramp, at)
+            rise = met(rise, footprints.level, entry(footprints.sag_rise, at), footprints.sagging)
             for j in range(begin, end):
                 weight = entry(footprints.weight, j)
                 deflection = load(motion, first + j - begin)
@@ -81,7 +98,8 @@ def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
     proportional = load(gains, 2 * kind) * sign
     derivative = load(gains, 2 * kind + 1) * sign
     none = proportional * 0.0
-    at_rest = none + rows.current_reference
+    at_rest = none + own(rows.current_reference, 0)
+    most = own_of(rows.current_max, rows.current_number, 2 * row + side)
     first = (2 * row + side) * law.n_circuits
     n = circuits.signal.shape[1]
     last, now = ((step - 1) % law.ring) * n + first, (step % law.ring) * n + first
@@ -130,11 +148,11 @@ def _control(rows, law, row, side, step, dt, gains, train, magnet, circuits):
             command = at_rest + signal
         else:
             command = at_rest + fma(proportional, error, derivative * rate)  # the same bits
-        command = maximum(minimum(command, rows.current_max), 0.0)
-        if law.decay > 0.0:
-            current = load(circuits.current, here) * law.decay
-            current = fma(load(circuits.command, here), law.command_before, current)
-            current = fma(command, law.command_now, current)
+        command = maximum(minimum(command, most), 0.0)
+        if law.lags:
+            current = load(circuits.current, here) * own(law.decay, 0)
+            current = fma(load(circuits.command, here), own(law.command_before, 0), current)
+            current = fma(command, own(law.command_now, 0), current)
             store(circuits.command, here, command)
             store(circuits.current, here, current)
             command = current
@@ -147,7 +165,8 @@ def _attract(rows, law, row, side, gains, magnet):
     sign = rows.outward[side]
     n_poles = rows.offset.size
     none = load(magnet.error, 0) * 0.0
-    reference = none + rows.gap_reference
+    reference = none + own(rows.gap_reference, 0)
+    most = own_of(rows.current_max, rows.current_number, 2 * row + side)
     smallest, largest, strongest = none + 1.0e9, none - 1.0e9, none
     total, moment = none, none
     mean_gap = reference
@@ -160,17 +179,18 @@ def _attract(rows, law, row, side, gains, magnet):
         if not law.own_gap:
             current = (current + load(magnet.current, entry(law.second, p))) * 0.5
         ratio = current / mean_gap if law.mean_gap_force else current / gap
-        constant = entry(rows.constant, (2 * row + side) * n_poles + p)
+        place = (2 * row + side) * n_poles + p
+        constant = own_of(rows.constant, rows.constant_number, place)
         pull = ratio * ratio * (sign * constant)
         store(magnet.pull, p, pull)
         total = total + pull
         moment = fma(pull, entry(rows.arm, p), moment)
         if law.accelerates:
             by = mean_gap if law.mean_gap_force else gap
-            direct = law.command_now * law.undelayed
+            direct = own(law.command_now, 0) * law.undelayed
             gain = load(gains, 4 + 2 * (1 if rows.is_guidance else 0)) * (2.0 * direct * constant)
             answer = ratio / by * gain
-            store(magnet.stiffening, p, choose(rows.current_max, current, answer, 0.0))
+            store(magnet.stiffening, p, choose(most, current, answer, 0.0))
         smallest = minimum(smallest, gap)
         largest = maximum(largest, gap)
         strongest = maximum(strongest, current)
@@ -186,7 +206,9 @@ def _answer_acceleration(rows, law, row, side, gains, train, magnet, circuits, f
     """
     n_poles = rows.offset.size
     none = force_z * 0.0
-    a, b, c, d = none + rows.mass, none, none, none + rows.inertia
+    mass, inertia = own(rows.mass, 0), own(rows.inertia, 0)
+    most = own_of(rows.current_max, rows.current_number, 2 * row + side)
+    a, b, c, d = none + mass, none, none, none + inertia
     for p in range(n_poles):
         g = load(magnet.stiffening, p)
         arm = entry(rows.arm, p)
@@ -197,8 +219,8 @@ def _answer_acceleration(rows, law, row, side, gains, train, magnet, circuits, f
         d = fma(g, arm * seen, d)
     before_z = load(train.before, rows.translation[row, side])
     before_turn = load(train.before, rows.rotation[row, side])
-    missing_z = force_z - before_z * rows.mass
-    missing_turn = force_turn - before_turn * rows.inertia
+    missing_z = force_z - before_z * mass
+    missing_turn = force_turn - before_turn * inertia
     determinant = a * d - b * c
     shift = (missing_z * d - missing_turn * b) / determinant
     turn = (missing_turn * a - missing_z * c) / determinant
@@ -215,8 +237,8 @@ def _answer_acceleration(rows, law, row, side, gains, train, magnet, circuits, f
     for c in range(law.n_circuits):
         command, current = load(circuits.command, first + c), load(circuits.current, first + c)
         new = fma(gain, fma(turn, entry(law.arm, c), shift), command)
-        new = maximum(minimum(new, rows.current_max), 0.0)
-        store(circuits.current, first + c, fma(new - command, law.command_now, current))
+        new = maximum(minimum(new, most), 0.0)
+        store(circuits.current, first + c, fma(new - command, own(law.command_now, 0), current))
         store(circuits.command, first + c, new)
     return more_z, more_turn
 
@@ -271,8 +293,11 @@ def attract(
             _look(footprints, rows, law, row, side, step, train, rails, magnet)
             _control(rows, law, row, side, step, dt, gains, train, magnet, circuits)
             total, moment, smallest, largest, strong = _attract(rows, law, row, side, gains, magnet)
-            force = load(train.force, translation) - (total - rows.static_force[row, side] * sign)
-            turn = load(train.force, rotation) - (moment - rows.static_moment[row, side] * sign)
+            magnet_place = 2 * row + side
+            static_force = own_of(rows.static_force, rows.force_number, magnet_place)
+            static_moment = own_of(rows.static_moment, rows.moment_number, magnet_place)
+            force = load(train.force, translation) - (total - static_force * sign)
+            turn = load(train.force, rotation) - (moment - static_moment * sign)
             if law.accelerates:
                 more, more_turn = _answer_acceleration(
                     rows, law, row, side, gains, train, magnet, circuits, force, turn
@@ -288,7 +313,8 @@ def attract(
                 gaps = none
                 for p in range(n_poles):
                     gaps = fma(load(magnet.error, p), sign, gaps)
-                store(watch.magnet_gap, number, gaps * (1.0 / n_poles) + rows.gap_reference)
+                mean_gap = gaps * (1.0 / n_poles) + own(rows.gap_reference, 0)
+                store(watch.magnet_gap, number, mean_gap)
                 currents = none
                 for p in range(n_poles):
                     one = load(magnet.current, entry(law.first, p))

@@ -1,6 +1,8 @@
 """What the kernels read and write: records of arrays, all samples of a row side by side.
 
-Arrays that end in ``LANES`` hold one number for each sample of a row; the others are shared by all.
+Arrays that end in ``LANES`` hold one number for each sample of a row; all share the others.
+Where "own" stands beside an array (n,) or a number, each sample may have its own: it is then a
+table of distinct rows (distinct, LANES), and the array named there says which row is whose.
 """
 
 from __future__ import annotations
@@ -13,6 +15,16 @@ COMPLETED, CONTACT, GAP_LOST, NOT_FINITE, STEP_TOO_LARGE = 0, 1, 2, 3, 4
 """End of a passage: the values of ``status`` [-]."""
 
 
+class Terms(NamedTuple):
+    """Sums over few columns whose coefficients each sample has of its own, for some places only."""
+
+    place: np.ndarray  # (sum,) where the sum belongs
+    start: np.ndarray  # (sum + 1,)
+    column: np.ndarray  # (term,)
+    number: np.ndarray  # (term,) row of the coefficient
+    rows: np.ndarray  # (distinct, LANES)
+
+
 class Vehicle(NamedTuple):
     """Train with open magnets; links in rows and columns of non-zero coefficients.
 
@@ -20,16 +32,21 @@ class Vehicle(NamedTuple):
     formed once for each degree of freedom and kind of link.
     """
 
-    inverse_mass: np.ndarray  # (dof,)
+    inverse_mass: np.ndarray  # (dof,) own by mass_number
+    mass_number: np.ndarray
     scaled_dof: np.ndarray  # (scaled,) degree of freedom
-    scaled_stiffness: np.ndarray  # (scaled,)
-    scaled_damping: np.ndarray  # (scaled,)
+    scaled_stiffness: np.ndarray  # (scaled,) own by stiffness_number
+    stiffness_number: np.ndarray
+    scaled_damping: np.ndarray  # (scaled,) own by damping_number
+    damping_number: np.ndarray
     link_start: np.ndarray  # (link + 1,) first scaled degree of freedom of each link
     link_scaled: np.ndarray  # (non-zero,)
     link_coefficient: np.ndarray  # (non-zero,)
     pull_start: np.ndarray  # (dof + 1,) the links that pull at a degree of freedom
     pull_link: np.ndarray  # (non-zero,)
     pull_coefficient: np.ndarray  # (non-zero,)
+    own_link: Terms  # what each sample has of its own in links beyond these, and in pulls
+    own_pull: Terms
     body_z: np.ndarray  # (car,) degree of freedom
     body_y: np.ndarray  # (car,)
     body_pitch: np.ndarray  # (car,)
@@ -44,17 +61,21 @@ class MagnetRows(NamedTuple):
     number: np.ndarray  # (row, side) row in the train's table of magnets
     translation: np.ndarray  # (row, side) degree of freedom
     rotation: np.ndarray  # (row, side)
-    static_force: np.ndarray  # (row, side) [N]
-    static_moment: np.ndarray  # (row, side) [N m]
-    constant: np.ndarray  # (row, side, pole) K of F = K (i/gap)^2 [N m^2/A^2]
+    static_force: np.ndarray  # (row side,) [N] own by force_number
+    force_number: np.ndarray
+    static_moment: np.ndarray  # (row side,) [N m] own by moment_number
+    moment_number: np.ndarray
+    constant: np.ndarray  # (row side pole,) K of F = K (i/gap)^2 [N m^2/A^2] own by constant_number
+    constant_number: np.ndarray
     offset: np.ndarray  # (pole,) ahead of the centre [m]
     arm: np.ndarray  # (pole,) displacement of the pole per rotation [m]
     outward: np.ndarray  # (side,) sign of the displacement that opens the gap
-    gap_reference: float  # [m]
-    current_reference: float  # [A]
-    current_max: float  # [A]
-    mass: float  # [kg]
-    inertia: float  # [kg m^2]
+    gap_reference: float | np.ndarray  # [m] own, one row
+    current_reference: float | np.ndarray  # [A] own, one row
+    current_max: np.ndarray  # (row side,) [A] own by current_number
+    current_number: np.ndarray
+    mass: float | np.ndarray  # [kg] own, one row
+    inertia: float | np.ndarray  # [kg m^2] own, one row
     is_guidance: bool
 
 
@@ -71,9 +92,10 @@ class Law(NamedTuple):
     senses: np.ndarray  # (pole,) whether the pole's gap feeds a circuit
     first: np.ndarray  # (pole,) the two circuits whose mean is the current of a pole
     second: np.ndarray
-    decay: float  # of the current in a step; zero without a lag [-]
-    command_now: float  # weights of the command at this step and the last in the current [-]
-    command_before: float
+    lags: bool  # some sample's current follows its command with a lag
+    decay: float | np.ndarray  # of the current in a step; zero without a lag [-] own, one row
+    command_now: float | np.ndarray  # weight of the command at this step in the current [-] own
+    command_before: float | np.ndarray  # and at the last
     delays: bool
     ring: int  # signals of so many steps are kept
     behind: int  # steps back to the latest of the three signals that a delayed one is taken from
@@ -167,8 +189,8 @@ class Stretches(NamedTuple):
     taken_to: np.ndarray
     factor_start: np.ndarray  # (stepped + 1,) Cholesky rows of the mass of stepped pier tops
     factor_top: np.ndarray  # coordinate
-    factor: np.ndarray
-    factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal
+    factor: np.ndarray  # own by the number of the entry
+    factor_inverse: np.ndarray  # (stepped,) inverse of the diagonal, own likewise
     stilled_start: np.ndarray  # (stretch + 1,) coordinates that the stretch before stepped
     stilled: np.ndarray
 
@@ -178,6 +200,10 @@ class Spans(NamedTuple):
 
     The coordinate of a mode is its motion relative to the pier tops.  In each stretch of a passage
     only some coordinates are stepped; the other modes follow the pier tops.
+
+    Where samples have guideways of their own, the rails' shapes are those of a basis that all
+    share, the same for each span, and a sample's coordinates change to it: ``change`` holds the
+    matrix (upright of the basis, upright), then (sideways of the basis, sideways), row by row.
     """
 
     n_spans: int
@@ -191,26 +217,37 @@ class Spans(NamedTuple):
     rail_z: np.ndarray  # (upright, stride)
     rail_roll: np.ndarray  # (sideways, stride)
     rail_y: np.ndarray  # (sideways, stride)
-    square: np.ndarray  # (mode,) squared circular frequency [1/s^2]
-    response: np.ndarray  # (mode,) makes the step exact for a mode on its own [-]
+    change: np.ndarray  # (0,) none; own (entry, LANES): see below
+    change_start: np.ndarray  # (span,) where a span's changes begin
+    square: np.ndarray  # (mode,) squared circular frequency [1/s^2] own by mode_number
+    response: np.ndarray  # (mode,) makes the step exact for a mode on its own [-] own likewise
+    mode_number: np.ndarray
     carried_start: np.ndarray  # (mode + 1,) what modes take along of the pier tops' motion
     carried_top: np.ndarray  # coordinate
-    carried: np.ndarray
+    carried: np.ndarray  # own by carried_number
+    carried_number: np.ndarray
     damping_column: np.ndarray  # coordinate, in rows that the stretches name
     damping: np.ndarray
+    damping_root: np.ndarray  # (coordinate,) factors on row and column; own by root_number
+    root_number: np.ndarray
     taken_mode: np.ndarray  # the same as carried by pier tops, in rows that the stretches name
-    taken: np.ndarray
+    taken: np.ndarray  # own by taken_number
+    taken_number: np.ndarray
     stiffness_start: np.ndarray  # (top + 1,) between pier tops
     stiffness_top: np.ndarray  # coordinate
-    stiffness: np.ndarray
+    stiffness: np.ndarray  # own by stiffness_number
+    stiffness_number: np.ndarray
     stretches: Stretches
     output_column: np.ndarray  # (output column,) coordinates that move midspan
-    midspan: np.ndarray  # (2, output column) z and y
+    midspan: np.ndarray  # (2 output column,) z and y, own (2 output column, LANES)
     middle: int  # span that midspan is of
-    rest: np.ndarray  # (3, stride) midspan z by z, y by roll and y of its left-out modes [m/N]
-    bearing: np.ndarray  # (4, output column) opening at the first end, mean and half difference of
-    # right and left, then at the last
-    bearing_rest: np.ndarray  # (6, stride) at each end mean by z, half difference by roll and y
+    rest: np.ndarray  # (3 stride,) midspan z by z, y by roll and y of its left-out modes [m/N] own
+    in_order: np.ndarray  # 0, 1, 2, … as many as there are rows of any table here
+    bearing: np.ndarray  # (4 output column,) opening at the first end, mean and half difference of
+    # right and left, then at the last; own (4 output column, LANES)
+    bearing_rest: (
+        np.ndarray
+    )  # (6 stride,) at each end mean by z, half difference by roll and y; own
 
 
 class Footprints(NamedTuple):
@@ -223,6 +260,10 @@ class Footprints(NamedTuple):
     rise: np.ndarray  # of the coefficients in the mean rate over a step as the pole moves on [1/s]
     rail: np.ndarray  # (footprint, side, 1 or LANES) irregularity of all samples, or of each [m]
     ramp: np.ndarray  # (footprint, side, 1 or LANES) its rate at the pole [m/s]
+    level: float | np.ndarray  # factor on both [-]; own, one row: then the sag is not in them
+    sag: np.ndarray  # (footprint side,) standing sag [m], where levels are own
+    sag_rise: np.ndarray  # (footprint side,) its rate at the pole [m/s]
+    sagging: float | np.ndarray  # factor on the sag [-] own, one row
 
 
 class Timing(NamedTuple):
@@ -234,8 +275,8 @@ class Timing(NamedTuple):
     speed: float
     start: float  # position of the nose at time zero [m]
     train_length: float
-    gap_contact: float
-    gap_lost: float
+    gap_contact: np.ndarray  # (LANES,) [m]
+    gap_lost: np.ndarray  # (LANES,) [m]
     sections: np.ndarray  # (section, 6) low-pass on guideway accelerations
     record_every: int  # steps between recorded rows; zero: none
     comfort: Comfort

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from maglev.compiled import kernel
-from maglev.mechanics.lanes import LANES, WIDE, entry, fma, load, store
+from maglev.mechanics.lanes import LANES, WIDE, entry, fma, load, own, own_of, store
 
 CACHE_LINE = 8
 """Doubles in a line of the processor's cache [-]."""
@@ -28,6 +28,18 @@ def weighted_sum(coefficients, columns, start, stop, source, total):
     for k in range(start, stop):
         total = fma(load(source, entry(columns, k)), entry(coefficients, k), total)
     return total
+
+
+@kernel()
+def add_terms(terms, sign, source, target):
+    """``target[place] += sign Σ rows[number] source[column]`` for each sum of the terms."""
+    for n in range(terms.place.size):
+        total = load(source, 0) * 0.0
+        for k in range(entry(terms.start, n), entry(terms.start, n + 1)):
+            coefficient = load(terms.rows, entry(terms.number, k))
+            total = fma(load(source, entry(terms.column, k)), coefficient, total)
+        at = entry(terms.place, n)
+        store(target, at, fma(total, sign, load(target, at)))
 
 
 @kernel()
@@ -133,6 +145,46 @@ def transform_both(
         store(right_rail, first + k + 1, b + f)
         store(left_rail, first + k + 1, b - f)
         k += 2
+
+
+@kernel()
+def change(matrix, begin, n_rows, n_columns, source, at, target, first):
+    """``target[first + r] = Σ_k matrix[begin + r, k] source[at + k]``, own rows of factors."""
+    none = load(source, at) * 0.0
+    for r in range(n_rows):
+        total, more = none, none
+        place = begin + r * n_columns
+        for k in range(0, n_columns - 1, 2):  # two sums: neither waits for the other
+            total = fma(load(source, at + k), own(matrix, place + k), total)
+            more = fma(load(source, at + k + 1), own(matrix, place + k + 1), more)
+        if n_columns % 2 == 1:
+            last = n_columns - 1
+            total = fma(load(source, at + last), own(matrix, place + last), total)
+        store(target, first + r, total + more)
+
+
+@kernel()
+def change_back(matrix, begin, n_rows, n_columns, source, at, columns, start, target):
+    """``target[columns[start + k]] += Σ_r matrix[begin + r, k] source[at + r]``."""
+    for k in range(n_columns):
+        total = load(target, entry(columns, start + k))
+        more = total * 0.0
+        for r in range(0, n_rows - 1, 2):
+            place = begin + r * n_columns + k
+            total = fma(load(source, at + r), own(matrix, place), total)
+            more = fma(load(source, at + r + 1), own(matrix, place + n_columns), more)
+        if n_rows % 2 == 1:
+            last = n_rows - 1
+            total = fma(load(source, at + last), own(matrix, begin + last * n_columns + k), total)
+        store(target, entry(columns, start + k), total + more)
+
+
+@kernel()
+def own_sum(coefficients, numbers, columns, start, stop, source, total):
+    """As `weighted_sum`, with coefficients that each sample may have of its own."""
+    for k in range(start, stop):
+        total = fma(load(source, entry(columns, k)), own_of(coefficients, numbers, k), total)
+    return total
 
 
 @kernel()

@@ -1,8 +1,8 @@
 """Rigid bodies with small rotations and the spring-damper links between them.
 
 A body is the set of its degrees of freedom; a point of it moves by a linear combination of them.
-A link is a linear combination, its strain, with a stiffness and a damping.  Theory:
-docs/theory/train.md.
+A link is a linear combination, its strain, with a stiffness and a damping.  A number may be
+an array (sample,) of those of many trains.  Theory: docs/theory/train.md.
 """
 
 from __future__ import annotations
@@ -144,4 +144,4 @@ def _combination(*terms: tuple[int | None, float]) -> Motion:
     for dof, factor in terms:
         if dof is not None:
             motion[dof] = motion.get(dof, 0.0) + factor
-    return {dof: factor for dof, factor in motion.items() if factor != 0.0}
+    return {dof: factor for dof, factor in motion.items() if np.any(factor != 0.0)}

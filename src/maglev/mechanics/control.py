@@ -11,10 +11,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from maglev.arrays import FloatArray
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.parameters import Circuit
+from maglev.parameters import Circuit, Control
 
 
 @dataclass(frozen=True)
@@ -160,3 +161,96 @@ def circuits(circuit: Circuit, n_poles: int) -> Grouping:
     array([[0.25, 0.25, 0.25, 0.25]])
     """
     return grouping(circuit.group, n_poles)
+
+
+def failing_magnets(x: FloatArray, side: IntArray) -> IntArray:
+    """Magnets of one kind in the order in which they are taken to fail.
+
+    The first is the right one in the middle of the train.  Sides take turns, and each place is that
+    of van der Corput's sequence, which halves the stretches between those before; then come the
+    magnets that face these.
+
+    Parameters
+    ----------
+    x : (magnet,)
+        Centres along the train [m].
+    side : (magnet,)
+        +1 right, -1 left, as many of each.
+
+    Returns
+    -------
+    order : (magnet,)
+        Numbers of the magnets.
+
+    Examples
+    --------
+    >>> x = np.tile([-1.0, -2.0, -3.0], 2)
+    >>> failing_magnets(x, np.repeat([1, -1], 3)).tolist()
+    [1, 3, 2, 4, 0, 5]
+    """
+    right, left = (
+        numbers[np.argsort(-x[numbers], kind="stable")]
+        for numbers in (np.flatnonzero(side > 0), np.flatnonzero(side < 0))
+    )
+    place = _halving(right.size)
+    turn = np.arange(right.size) % 2 == 0
+    first = np.where(turn, right[place], left[place])
+    return np.concatenate([first, np.where(turn, left[place], right[place])])
+
+
+def _halving(n: int) -> IntArray:
+    """Places 0 … n - 1 in the order of van der Corput's sequence, from the middle."""
+    found: dict[int, None] = {}
+    number = 1
+    while len(found) < n:
+        share = sum((number >> bit & 1) / 2 ** (bit + 1) for bit in range(number.bit_length()))
+        found[int(share * n)] = None
+        number += 1
+    return np.array(list(found), dtype=np.int64)
+
+
+def first_moving_step(control: Control, first_step: int) -> int:
+    """Number of the first step on which anything moves: with failed magnets, the first of all."""
+    fails = control.suspension.failed_magnets or control.guidance.failed_magnets
+    return 1 if fails else first_step
+
+
+def refuse_too_many(n_failed: npt.ArrayLike, n_magnets: int, *, guidance: bool) -> None:
+    """Refuse more failed magnets than the train has of the kind.
+
+    Raises
+    ------
+    UserError
+        If a number of failed magnets exceeds ``n_magnets``.
+    """
+    most = int(np.max(n_failed))
+    if most > n_magnets:
+        raise UserError(
+            f"control.{'guidance' if guidance else 'suspension'}.failed_magnets must be at most "
+            f"{n_magnets}, the train's magnets of the kind, got {most}"
+        )
+
+
+def without_current(
+    circuit: Circuit, x: FloatArray, side: IntArray, *, guidance: bool
+) -> BoolArray:
+    """Which magnets of a kind (magnet,) carry no current.
+
+    Parameters
+    ----------
+    circuit
+        Says how many.
+    x, side : (magnet,)
+        As `failing_magnets` takes them.
+    guidance
+        The kind, for the message.
+
+    Raises
+    ------
+    UserError
+        If more fail than there are.
+    """
+    refuse_too_many(circuit.failed_magnets, x.size, guidance=guidance)
+    failed = np.zeros(x.size, dtype=bool)
+    failed[failing_magnets(x, side)[: circuit.failed_magnets]] = True
+    return failed

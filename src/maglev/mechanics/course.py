@@ -36,7 +36,7 @@ class Course:
     first_step
         Number of the first step on which anything moves [-].  Until the nose reaches the
         irregularity, or without one the guideway, the train rests in its equilibrium over rigid
-        straight track, and the steps are skipped.
+        straight track, and the steps are skipped; not with failed magnets.
     """
 
     time_step: float

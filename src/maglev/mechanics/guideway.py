@@ -26,10 +26,8 @@ from maglev.parameters import BeamSection, Guideway, Pier
 RIGHT, LEFT = 1, -1
 """The two rails."""
 
-_PIER_ELEMENT = 1.0  # longest pier element at refinement 1 [m], assumed
-_PIER_AXES = np.array(
-    [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
-)  # downwards from the top
+PIER_ELEMENT = 1.0  # longest pier element at refinement 1 [m], assumed
+PIER_AXES = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])  # downwards from the top
 _TORSION_TERMS = 20  # odd terms of the series for a rectangle; the next is below 1e-8 of the first
 
 
@@ -201,8 +199,8 @@ class GuidewayModel:
             girder = dof[np.abs(self.place[dof] - [x, 0.0, 0.0]).max(axis=1) < 1e-6]
             girder = girder[np.argsort(self.component[girder])]
             for side, y in enumerate((bearing.y, -bearing.y)):
-                rows[2 * end + side, girder] = -_rigid_arm(y, bearing.z)[Z]
-                rows[2 * end + side, self.pier_top_dof[span + end]] = _rigid_arm(y, 0.0)[Z]
+                rows[2 * end + side, girder] = -rigid_arm(y, bearing.z)[Z]
+                rows[2 * end + side, self.pier_top_dof[span + end]] = rigid_arm(y, 0.0)[Z]
         return sparse.csr_array(rows)
 
 
@@ -251,7 +249,7 @@ class ModalDamping:
 
 
 @dataclass(frozen=True)
-class _Span:
+class SpanModel:
     """Matrices and nodes of one span."""
 
     mass: sparse.csr_array
@@ -287,7 +285,7 @@ def build(guideway: Guideway) -> GuidewayModel:
     >>> model.pier_top_dof.shape  # two piers
     (2, 6)
     """
-    span, pier_mass, pier_stiffness, pier_depth = _span(guideway), *_pier(guideway)
+    span, pier_mass, pier_stiffness, pier_depth = one_span(guideway), *one_pier(guideway)
     n_pier, n_span, n_spans = pier_mass.shape[0], span.mass.shape[0], guideway.n_spans
     pitch = n_pier + n_span
     pier_start = pitch * np.arange(n_spans + 1)
@@ -455,7 +453,7 @@ def _factors(matrix: sparse.csc_array) -> SuperLU:
     )
 
 
-def _rigid_arm(dy: float, dz: float) -> FloatArray:
+def rigid_arm(dy: float, dz: float) -> FloatArray:
     """Six motions at a point (0, dy, dz) from those of the node that carries it rigidly."""
     arm = np.eye(6)
     arm[X, PITCH], arm[X, YAW] = dz, -dy
@@ -477,7 +475,7 @@ def _scattered(blocks: FloatArray, dof: IntArray, n: int) -> sparse.csr_array:
     return sparse.coo_array((blocks.ravel(), (row, column)), shape=(n, n)).tocsr()
 
 
-def _span(guideway: Guideway) -> _Span:
+def one_span(guideway: Guideway) -> SpanModel:
     """One span: girder and two rails, the arms between them eliminated."""
     rail, r = guideway.rail, guideway.refinement
     n = rail.units_per_span * rail.connectors_per_unit
@@ -542,7 +540,7 @@ def _span(guideway: Guideway) -> _Span:
 
     row, column, value = [free_dof], [np.arange(free_dof.size)], [np.ones(free_dof.size)]
     for node, leader in zip(tied, np.tile(girder_node, 2), strict=True):
-        arm = _rigid_arm(node_y[node], node_z[node])
+        arm = rigid_arm(node_y[node], node_z[node])
         arm[free[node]] = 0.0
         i, j = np.nonzero(arm)
         row.append(6 * node + i)
@@ -552,7 +550,7 @@ def _span(guideway: Guideway) -> _Span:
         (np.concatenate(value), (np.concatenate(row), np.concatenate(column))),
         shape=(n_full, free_dof.size),
     ).tocsr()
-    return _Span(
+    return SpanModel(
         mass=(motion.T @ mass @ motion).tocsr(),
         stiffness=(motion.T @ stiffness @ motion).tocsr(),
         motion=motion,
@@ -564,7 +562,7 @@ def _span(guideway: Guideway) -> _Span:
     )
 
 
-def _rectangle(pier: Pier, width_y: float) -> BeamSection:
+def pier_section(pier: Pier, width_y: float) -> BeamSection:
     """Section of a pier in the axes of a beam that runs downwards (its z is -x of the guideway)."""
     wx, wy = pier.width_x, width_y
     about_y, about_x = wy * wx**3 / 12, wx * wy**3 / 12
@@ -617,23 +615,25 @@ def rectangle_torsion_constant(width: float, depth: float) -> float:
     return float(a * b**3 * (1 / 3 - 64 * b / (math.pi**5 * a) * series))
 
 
-def _pier(guideway: Guideway) -> tuple[sparse.csr_array, sparse.csr_array, FloatArray]:
+def one_pier(guideway: Guideway) -> tuple[sparse.csr_array, sparse.csr_array, FloatArray]:
     """Mass, stiffness and depth below the top [m] of a pier's nodes, foot left out."""
     pier, r = guideway.pier, guideway.refinement
-    cap = math.ceil(pier.cap_height / _PIER_ELEMENT - 1e-9) * r
-    shaft = math.ceil((pier.height - pier.cap_height) / _PIER_ELEMENT - 1e-9) * r
+    cap = math.ceil(pier.cap_height / PIER_ELEMENT - 1e-9) * r
+    shaft = math.ceil((pier.height - pier.cap_height) / PIER_ELEMENT - 1e-9) * r
     depth = np.concatenate(
         [
             np.linspace(0.0, pier.cap_height, cap + 1),
             np.linspace(pier.cap_height, pier.height, shaft + 1)[1:],
         ]
     )
-    section = [_rectangle(pier, pier.cap_width_y)] * cap + [_rectangle(pier, pier.width_y)] * shaft
+    section = [pier_section(pier, pier.cap_width_y)] * cap + [
+        pier_section(pier, pier.width_y)
+    ] * shaft
     pairs = list(zip(section, np.diff(depth), strict=True))
     dof = 6 * np.arange(cap + shaft)[:, np.newaxis] + np.arange(12)
     mass, stiffness = (
         _scattered(
-            np.stack([timoshenko.turned(matrix(s, length), _PIER_AXES) for s, length in pairs]),
+            np.stack([timoshenko.turned(matrix(s, length), PIER_AXES) for s, length in pairs]),
             dof,
             6 * depth.size,
         )[:-6, :-6]
@@ -643,13 +643,13 @@ def _pier(guideway: Guideway) -> tuple[sparse.csr_array, sparse.csr_array, Float
 
 
 def _bearings(
-    guideway: Guideway, span: _Span, pier_start: IntArray, span_start: IntArray, n_dof: int
+    guideway: Guideway, span: SpanModel, pier_start: IntArray, span_start: IntArray, n_dof: int
 ) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Stiffness and damping of all bearings: girder end against pier top, in x, y and z."""
     bearing = guideway.bearing
     stretch = np.concatenate(
         [
-            np.hstack([_rigid_arm(y, bearing.z)[:3], -_rigid_arm(y, 0.0)[:3]])
+            np.hstack([rigid_arm(y, bearing.z)[:3], -rigid_arm(y, 0.0)[:3]])
             for y in (bearing.y, -bearing.y)
         ]
     )  # (two bearings times x, y, z; girder end and pier top)
@@ -688,7 +688,7 @@ def _bearings(
 def _line(
     guideway: Guideway,
     section: BeamSection,
-    span: _Span,
+    span: SpanModel,
     element: tuple[IntArray, IntArray],
     span_start: IntArray,
 ) -> BeamLine:

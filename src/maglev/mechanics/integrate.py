@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from maglev.arrays import BoolArray, FloatArray
-from maglev.errors import UserError
+from maglev.arrays import BoolArray, FloatArray, IntArray
+from maglev.errors import StepTooLarge, UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import packing
 from maglev.mechanics import train as train_model
@@ -20,6 +21,7 @@ from maglev.mechanics._records import (
     NOT_FINITE,
     STEP_TOO_LARGE,
     Footprints,
+    Law,
     MagnetRows,
     Outcome,
     Spans,
@@ -31,17 +33,31 @@ from maglev.mechanics.course import course, track_range
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.lanes import LANES
 from maglev.mechanics.linear import Block
+from maglev.mechanics.own import (
+    OwnTrains,
+    Shape,
+    own_footprints,
+    own_law,
+    own_timing,
+    own_trains,
+    shape_of,
+)
+from maglev.mechanics.own_spans import Frame, frame_of, guideways_of, own_spans
 from maglev.mechanics.reduction import ReducedGuideway, reduce
 from maglev.mechanics.responses import Passages, checked_gains, compared_with
-from maglev.mechanics.statics import largest_deflection
+from maglev.mechanics.statics import influence, largest_deflection
 from maglev.mechanics.step_limit import (
+    Headroom,
     guideway_limit,
+    headroom,
     safe_gains,
     samples_too_fast,
     step_holds,
     train_limit,
     train_parts,
+    trains_too_fast,
 )
+from maglev.mechanics.trains import own_rates
 from maglev.parameters import Config
 
 
@@ -63,6 +79,8 @@ class System:
     spans: Spans
     parts: tuple[Block, ...]
     safe_gains: FloatArray
+    headroom: Headroom
+    profile: Profile
     static_deflection: float
     config: Config
 
@@ -88,8 +106,10 @@ def prepare(config: Config, profile: Profile) -> System:
 
     Raises
     ------
+    StepTooLarge
+        If the time step exceeds the stability limit.
     UserError
-        If the time step exceeds the stability limit or the profile does not cover the passage.
+        If the profile does not cover the passage.
     """
     train = train_model.build(config.train)
     guideway = guideway_model.build(config.guideway)
@@ -101,7 +121,8 @@ def prepare(config: Config, profile: Profile) -> System:
     parts = train_parts(config)
     _check_step(config, reduced, parts)
     _check_reach(config, profile)
-    suspension, guidance = (packing.magnet_rows(train, guidance=kind) for kind in (False, True))
+    suspension = packing.magnet_rows(train, config.control.suspension, guidance=False)
+    guidance = packing.magnet_rows(train, config.control.guidance, guidance=True)
     suspension_footprints, suspension_ground = packing.footprints(
         config, suspension, guideway, reduced
     )
@@ -120,15 +141,19 @@ def prepare(config: Config, profile: Profile) -> System:
         spans=packing.spans(reduced, config),
         parts=parts,
         safe_gains=safe_gains(parts, _mean_gains(config), course(config).time_step),
+        headroom=headroom(parts, _mean_gains(config), own_rates(train), course(config).time_step),
+        profile=profile,
         static_deflection=largest_deflection(guideway, train),
         config=config,
     )
 
 
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def integrate(
     system: System,
     gains: FloatArray,
     *,
+    values: Mapping[str, FloatArray] | None = None,
     profile_of: Callable[[int], Profile] | None = None,
     record_every: int = 0,
     with_magnets: bool = True,
@@ -147,6 +172,9 @@ def integrate(
     gains : (sample, 4) or (sample, 8)
         Suspension k_p [A/m], k_d [A s/m], guidance k_p, k_d; then suspension k_a [A s²/m],
         k_i [A/(m s)], guidance k_a, k_i, those of the configuration if left out.
+    values : key of (sample,)
+        Numbers in SI of each sample in place of those of the configuration, by dotted keys whose
+        cost is that of a sample (`maglev.mechanics.varied.cost_of`).
     profile_of
         Track irregularity of a sample by its number; the one that ``system`` was prepared with if
         not given.
@@ -167,64 +195,227 @@ def integrate(
     Raises
     ------
     UserError
-        If the gains have the wrong shape or are not finite.
+        If the gains have the wrong shape or are not finite, or a train of the samples' own cannot
+        rest.
     """
-    config = system.config
-    gains = checked_gains(gains, config.gains.further)
-    n_samples = gains.shape[0]
-    n_rows = -(-n_samples // LANES)
-    padded = np.empty((n_rows * LANES, 8))
-    padded[:n_samples] = gains
-    padded[n_samples:] = gains[-1]
+    gains = checked_gains(gains, system.config.gains.further)
+    batch = _batch(system, gains, values or {}, profile_of, record_every, with_magnets)
+    found: list[tuple[Outcome, BoolArray, dict[str, FloatArray]]] = []
+    n_rows = -(-gains.shape[0] // LANES)
+    with ThreadPoolExecutor(max_workers=n_threads) as pool:
+        for first in range(0, n_rows, BLOCK):
+            rows = range(first, min(first + BLOCK, n_rows))
+            of_row = _block(batch, rows)
+
+            def one_row(
+                row: int, of_row: RowOf = of_row
+            ) -> tuple[Outcome, BoolArray, dict[str, FloatArray]]:
+                arguments, too_fast, compared = of_row(row)
+                cross(*arguments)
+                if on_progress is not None:
+                    on_progress(min(LANES, gains.shape[0] - row * LANES))
+                return arguments[-1], too_fast, compared
+
+            found += pool.map(one_row, rows)
+    outcomes = [outcome for outcome, _, _ in found]
+    too_fast = np.concatenate([flags for _, flags, _ in found])[: gains.shape[0]]
+    compared = {
+        name: np.concatenate([row[name] for _, _, row in found])[: gains.shape[0]]
+        for name in found[0][2]
+    }
+    return _gathered(outcomes, gains.shape[0], system, batch.timing, too_fast, compared)
+
+
+BLOCK = 16
+"""Rows of samples whose own trains are made at once [-]; assumed: tables of some megabytes."""
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Samples to run: a system, their gains and values, their tracks, and what all share."""
+
+    system: System
+    gains: FloatArray
+    values: Mapping[str, FloatArray]
+    profile_of: Callable[[int], Profile] | None
+    laws: tuple[Law, Law]
+    timing: Timing
+    footprints: tuple[Footprints, Footprints]
+    grounds: tuple[packing.Ground, packing.Ground]
+    shape: Shape | None
+    frame: Frame | None
+    with_magnets: bool
+
+    def samples(self, rows: range) -> IntArray:
+        """Numbers of the samples in rows; the last stands wherever a row is not full."""
+        numbers = np.arange(rows.start * LANES, rows.stop * LANES)
+        return np.minimum(numbers, self.gains.shape[0] - 1)
+
+
+@lru_cache(maxsize=2)
+def influence_of(config: Config) -> FloatArray:
+    """Deflection of midspan per force of each pole at rest, for all places of the train."""
+    return influence(guideway_model.build(config.guideway), train_model.build(config.train))
+
+
+def _batch(
+    system: System,
+    gains: FloatArray,
+    values: Mapping[str, FloatArray],
+    profile_of: Callable[[int], Profile] | None,
+    record_every: int,
+    with_magnets: bool,
+) -> _Batch:
+    """What all samples share."""
+    config, kinds = system.config, (system.suspension, system.guidance)
     timing = packing.timing(config, record_every)
-    kinds = (system.suspension, system.guidance)
-    suspension_law, guidance_law = (
+    circuits = (config.control.suspension, config.control.guidance)
+    laws = [
         packing.law(circuit, rows, timing.time_step, gains)
-        for circuit, rows in zip(
-            (config.control.suspension, config.control.guidance), kinds, strict=True
+        for circuit, rows in zip(circuits, kinds, strict=True)
+    ]
+    grounds = system.grounds
+    footprints = (system.suspension_footprints, system.guidance_footprints)
+    if any(key.endswith(".failed_magnets") for key in values):
+        timing = timing._replace(first_step=1)
+    if values:  # each sample's sag is its own: the shared track is the irregularity alone
+        suspension, guidance = (
+            replace(one, sag=0.0 * one.sag, sag_slope=0.0 * one.sag_slope) for one in grounds
         )
+        grounds = (suspension, guidance)
+        footprints = _on_tracks(footprints, packing.tracks(config, grounds, [system.profile]))
+    of_guideway = tuple(key for key in values if key.startswith("guideway."))
+    others = tuple(key for key in values if key not in of_guideway)
+    shape = shape_of(config, system.train, kinds, others) if values else None
+    frame = frame_of(config, of_guideway) if of_guideway else None
+    return _Batch(
+        system,
+        gains,
+        values,
+        profile_of,
+        (laws[0], laws[1]),
+        timing,
+        footprints,
+        grounds,
+        shape,
+        frame,
+        with_magnets,
     )
 
-    def one_row(row: int) -> Outcome:
-        outcome = packing.empty_outcome(system.train, kinds, timing, with_magnets=with_magnets)
-        lanes = np.ascontiguousarray(padded[row * LANES : (row + 1) * LANES].T)
-        suspension_footprints, guidance_footprints = (
-            system.suspension_footprints,
-            system.guidance_footprints,
-        )
-        if profile_of is not None:
-            numbers = np.minimum(np.arange(row * LANES, (row + 1) * LANES), n_samples - 1)
-            profiles = {int(k): profile_of(int(k)) for k in np.unique(numbers)}
-            for profile in profiles.values():
-                _check_reach(config, profile)
-            of_kinds = packing.tracks(config, system.grounds, [profiles[int(k)] for k in numbers])
-            suspension_footprints, guidance_footprints = (
-                footprints._replace(rail=rail, ramp=ramp)
-                for footprints, (rail, ramp) in zip(
-                    (suspension_footprints, guidance_footprints), of_kinds, strict=True
-                )
-            )
-        cross(
-            system.vehicle,
-            system.suspension,
-            system.guidance,
-            suspension_law,
-            guidance_law,
-            suspension_footprints,
-            guidance_footprints,
-            system.spans,
-            timing,
-            lanes,
-            outcome,
-        )
-        if on_progress is not None:
-            on_progress(min(LANES, n_samples - row * LANES))
-        return outcome
 
-    with ThreadPoolExecutor(max_workers=n_threads) as pool:
-        outcomes = list(pool.map(one_row, range(n_rows)))
-    too_fast = samples_too_fast(system.parts, gains, timing.time_step, system.safe_gains)
-    return _gathered(outcomes, n_samples, system, timing, too_fast)
+def _on_tracks(
+    footprints: tuple[Footprints, Footprints], tracks: Sequence[tuple[FloatArray, FloatArray]]
+) -> tuple[Footprints, Footprints]:
+    """The footprints of both kinds with what the poles meet on other tracks."""
+    first, second = (
+        one._replace(rail=rail, ramp=ramp)
+        for one, (rail, ramp) in zip(footprints, tracks, strict=True)
+    )
+    return first, second
+
+
+RowOf = Callable[[int], tuple[tuple, BoolArray, dict[str, FloatArray]]]
+"""Of a row by its number: arguments of the kernel, for which of its samples the step is too large
+(LANES,), and what its responses are compared with."""
+
+
+def _block(batch: _Batch, rows: range) -> RowOf:
+    """What becomes of the rows of a block."""
+    system, timing = batch.system, batch.timing
+    numbers = batch.samples(rows)
+    gains = batch.gains[numbers]
+
+    def lanes(row: int) -> slice:
+        return slice((row - rows.start) * LANES, (row - rows.start + 1) * LANES)
+
+    if batch.shape is None:
+        too_fast = samples_too_fast(system.parts, gains, timing.time_step, system.safe_gains)
+        compared = compared_with(system.config, system.static_deflection, LANES)
+        return lambda row: (_shared_arguments(batch, row), too_fast[lanes(row)], compared)
+    values = {key: of_all[numbers] for key, of_all in batch.values.items()}
+    others = {key: values[key] for key in batch.shape.keys}
+    own = own_trains(batch.shape, others, numbers.size)
+    influence = influence_of(system.config)
+    too_fast = trains_too_fast(system.config, system.headroom, own.rates, gains, others)
+
+    def of_row(row: int) -> tuple[tuple, BoolArray, dict[str, FloatArray]]:
+        samples = lanes(row)
+        spans, beyond = system.spans, np.zeros(LANES, dtype=bool)
+        stiffer, softness = np.ones(LANES), np.ones(LANES)
+        if batch.frame is not None:
+            each = {key: one[samples] for key, one in values.items()}
+            guideways = guideways_of(system.config, each, range(LANES))
+            spans, beyond, softness = own_spans(batch.frame, guideways)
+            modulus = [one.rail.section.elastic_modulus for one in guideways]
+            stiffer = np.array(modulus) / system.config.guideway.rail.section.elastic_modulus
+        arguments = _own_arguments(batch, own, row, samples, spans, 1.0 / stiffer)
+        compared = own.compared_with(influence, system.config.guideway.span_length, samples)
+        compared["static_deflection"] *= softness
+        return arguments, too_fast[samples] | beyond, compared
+
+    return of_row
+
+
+def _shared_arguments(batch: _Batch, row: int) -> tuple:
+    """Arguments of the kernel for a row of samples that share a train."""
+    system = batch.system
+    kinds = (system.suspension, system.guidance)
+    return (
+        system.vehicle,
+        *kinds,
+        *batch.laws,
+        *_tracks_of_row(batch, row),
+        system.spans,
+        batch.timing,
+        np.ascontiguousarray(batch.gains[batch.samples(range(row, row + 1))].T),
+        packing.empty_outcome(system.train, kinds, batch.timing, with_magnets=batch.with_magnets),
+    )
+
+
+def _own_arguments(
+    batch: _Batch, own: OwnTrains, row: int, samples: slice, spans: Spans, softer: FloatArray
+) -> tuple:
+    """Arguments of the kernel for a row of samples that have each a train of its own.
+
+    The sag is that of the rail between its connectors: it goes with the rail's softness.
+    """
+    system, config = batch.system, batch.system.config
+    kinds = (own.kind(0, samples), own.kind(1, samples))
+    timing = own_timing(batch.timing, own, samples)
+    circuits = (config.control.suspension, config.control.guidance)
+    laws = [
+        own_law(law, lag[samples], circuit.delay, timing.time_step)
+        for law, lag, circuit in zip(batch.laws, own.lag, circuits, strict=True)
+    ]
+    footprints = [
+        own_footprints(one, ground, level[samples], sagging[samples] * softer, config.passage.speed)
+        for one, ground, level, sagging in zip(
+            _tracks_of_row(batch, row), system.grounds, own.level, own.sagging, strict=True
+        )
+    ]
+    return (
+        own.vehicle(samples),
+        *kinds,
+        *laws,
+        *footprints,
+        spans,
+        timing,
+        np.ascontiguousarray(batch.gains[batch.samples(range(row, row + 1))].T),
+        packing.empty_outcome(system.train, kinds, timing, with_magnets=batch.with_magnets),
+    )
+
+
+def _tracks_of_row(batch: _Batch, row: int) -> tuple[Footprints, Footprints]:
+    """The footprints of both kinds on the track, or the tracks, of a row of samples."""
+    if batch.profile_of is None:
+        return batch.footprints
+    numbers = batch.samples(range(row, row + 1))
+    profiles = {int(k): batch.profile_of(int(k)) for k in np.unique(numbers)}
+    config = batch.system.config
+    for profile in profiles.values():
+        _check_reach(config, profile)
+    of_kinds = packing.tracks(config, batch.grounds, [profiles[int(k)] for k in numbers])
+    return _on_tracks(batch.footprints, of_kinds)
 
 
 def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ...]) -> None:
@@ -234,7 +425,7 @@ def _check_step(config: Config, reduced: ReducedGuideway, parts: tuple[Block, ..
     if not step_holds(parts, gains, dt):
         limit = min(limit, train_limit(parts, gains))
     if not dt < limit:
-        raise UserError(
+        raise StepTooLarge(
             f"passage.time_step must be below the stability limit of {limit * 1e3:.3g} ms, "
             f"got {dt * 1e3:.3g} ms; take a smaller step or lower passage.mode_cutoff"
         )
@@ -261,6 +452,7 @@ def _gathered(
     system: System,
     timing: Timing,
     too_fast: BoolArray,
+    compared: dict[str, FloatArray],
 ) -> Passages:
     n_cars = system.vehicle.body_z.size
     n_magnets = system.train.magnets.x.size
@@ -310,7 +502,7 @@ def _gathered(
         weighted=weighted,
         lift=extreme[:, -1],
         lift_time=when[:, -1],
-        **compared_with(system.config, system.static_deflection, n_samples),
+        **compared,
         gap_min=bounds[:, 0:2],
         gap_max=bounds[:, 2:4],
         current_max=bounds[:, 4:6],

@@ -6,6 +6,12 @@ operation mixes lanes, so a sample's numbers cannot depend on its neighbours, bi
 `entry` reads one number that all samples share, ``array.ravel()[index]``; Numba's own indexing
 would first ask of every index whether it counts from the end.
 
+`own` and `own_of` read what either all samples share or each has of its own, by the type of what
+holds it: numbers ``(…,)`` are shared, rows ``(…, LANES)`` are not.  One source of a kernel so
+becomes two pieces of machine code, and that of shared numbers is the same as if there were no rows.
+`has_rows` is known when a kernel is compiled, and what it excludes is left out.
+`met` is ``value`` where ``level`` is a number, and ``value level + more times`` where it is a row.
+
 With ``NUMBA_DISABLE_JIT=1`` the same names act on NumPy rows, so that kernels run as plain Python.
 """
 
@@ -131,6 +137,83 @@ def _entry(typing_context: Any, array: Any, index: Any) -> Any:
     return array.dtype(array, index), codegen
 
 
+def _is_rows(values: Any) -> bool:
+    """Whether an array holds rows of samples; numbers and flat arrays are shared by all."""
+    return isinstance(values, types.Array) and values.ndim == 2
+
+
+def _read(values: Any) -> Any:
+    """Result type of reading a number or a row, and how it is read at a place."""
+
+    def codegen(context: Any, builder: Any, kind: Any, held: Any, place: Any) -> Any:
+        if not isinstance(kind, types.Array):
+            return held
+        if _is_rows(kind):
+            return builder.load(_row_pointer(context, builder, kind, held, place), align=8)
+        view = context.make_array(kind)(context, builder, held)
+        return builder.load(builder.gep(view.data, [place]))
+
+    if not isinstance(values, types.Array):
+        return values, codegen
+    if values.layout != "C" or values.ndim > 2:
+        raise TypingError(f"own needs numbers or rows in C order, got {values}")
+    return (LANE if _is_rows(values) else values.dtype), codegen
+
+
+@intrinsic
+def _own(typing_context: Any, values: Any, place: Any) -> Any:
+    result, read = _read(values)
+
+    def codegen(context: Any, builder: Any, sig: Signature, args: Any) -> Any:
+        at = context.cast(builder, args[1], sig.args[1], types.intp)
+        return read(context, builder, sig.args[0], args[0], at)
+
+    return result(values, place), codegen
+
+
+@intrinsic
+def _own_of(typing_context: Any, values: Any, numbers: Any, place: Any) -> Any:
+    result, read = _read(values)
+
+    def codegen(context: Any, builder: Any, sig: Signature, args: Any) -> Any:
+        at = context.cast(builder, args[2], sig.args[2], types.intp)
+        if _is_rows(sig.args[0]):
+            view = context.make_array(sig.args[1])(context, builder, args[1])
+            at = builder.load(builder.gep(view.data, [at]))
+        return read(context, builder, sig.args[0], args[0], at)
+
+    return result(values, numbers, place), codegen
+
+
+@intrinsic
+def _has_rows(typing_context: Any, values: Any) -> Any:
+    rows = _is_rows(values)
+
+    def codegen(context: Any, builder: Any, sig: Signature, args: Any) -> Any:
+        return context.get_constant(types.boolean, rows)
+
+    return types.boolean(values), codegen
+
+
+@intrinsic
+def _met(typing_context: Any, value: Any, level: Any, more: Any, times: Any) -> Any:
+    own_level = _is_rows(level)
+
+    def codegen(context: Any, builder: Any, sig: Signature, args: Any) -> Any:
+        if not own_level:
+            return args[0]
+        first = ir.Constant(ir.IntType(64), 0)
+        factors = [
+            builder.load(_row_pointer(context, builder, sig.args[k], args[k], first), align=8)
+            for k in (1, 3)
+        ]
+        lanes = [_as_lane(context, builder, args[k], sig.args[k]) for k in (0, 2)]
+        added = builder.fmul(lanes[1], factors[1])
+        return builder.fadd(builder.fmul(lanes[0], factors[0]), added)
+
+    return (LANE if own_level else value)(value, level, more, times), codegen
+
+
 @intrinsic
 def _fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     def codegen(context: Any, builder: Any, sig: Signature, args: Any) -> Any:
@@ -184,6 +267,27 @@ def _entry_python(array: np.ndarray, index: int) -> Any:
     return array.reshape(-1)[index]
 
 
+def _own_python(values: Any, place: int) -> Any:
+    if not isinstance(values, np.ndarray):
+        return values
+    return _load_python(values, place) if values.ndim == 2 else values[place]
+
+
+def _own_of_python(values: Any, numbers: np.ndarray, place: int) -> Any:
+    rows = isinstance(values, np.ndarray) and values.ndim == 2
+    return _own_python(values, int(numbers[place]) if rows else place)
+
+
+def _has_rows_python(values: Any) -> bool:
+    return isinstance(values, np.ndarray) and values.ndim == 2
+
+
+def _met_python(value: Any, level: Any, more: Any, times: Any) -> Any:
+    if not isinstance(level, np.ndarray):
+        return value
+    return value * level.reshape(LANES) + more * times.reshape(LANES)
+
+
 def _fma_python(a: Any, b: Any, c: Any) -> Any:
     return a * b + c
 
@@ -203,6 +307,8 @@ def _choose_python(a: Any, b: Any, x: Any, y: Any) -> Any:
 if numba.config.DISABLE_JIT:
     load, store, fma, choose = _load_python, _store_python, _fma_python, _choose_python
     minimum, maximum, entry = _minimum_python, _maximum_python, _entry_python
+    own, own_of, met, has_rows = _own_python, _own_of_python, _met_python, _has_rows_python
 else:
     load, store, fma, choose = _load, _store, _fma, _choose
     minimum, maximum, entry = _minimum, _maximum, _entry
+    own, own_of, met, has_rows = _own, _own_of, _met, _has_rows

@@ -19,12 +19,13 @@ from maglev.mechanics._records import (
     Outcome,
     Spans,
     Stretches,
+    Terms,
     Timing,
     Vehicle,
 )
 from maglev.mechanics.activity import Stretch, stepped_mass, stretches, top_stiffness
 from maglev.mechanics.comfort import WEIGHTINGS, readings
-from maglev.mechanics.control import grouping, late_current
+from maglev.mechanics.control import first_moving_step, grouping, late_current, without_current
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile, mean_displacement
 from maglev.mechanics.lanes import LANES
@@ -32,6 +33,9 @@ from maglev.mechanics.reduction import ReducedGuideway, face_weights, standing_s
 from maglev.mechanics.responses import acceleration_filter
 from maglev.mechanics.step_limit import step_response
 from maglev.parameters import Circuit, Config, Guideway, Magnet
+
+_SHARED = np.zeros(0, dtype=np.int64)
+"""Numbers of rows where all samples share one number."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +67,20 @@ def vehicle(train: train_model.TrainModel) -> Vehicle:
     scaled, number = np.unique(hangs, axis=0, return_inverse=True)
     return Vehicle(
         inverse_mass=1.0 / train.mass,
+        mass_number=_SHARED,
         scaled_dof=scaled[:, 0].astype(np.int64),
         scaled_stiffness=np.ascontiguousarray(scaled[:, 1]),
+        stiffness_number=_SHARED,
         scaled_damping=np.ascontiguousarray(scaled[:, 2]),
+        damping_number=_SHARED,
         link_start=rows.indptr.astype(np.int64),
         link_scaled=number.ravel().astype(np.int64),
         link_coefficient=rows.data.astype(np.float64),
         pull_start=columns.indptr.astype(np.int64),
         pull_link=columns.indices.astype(np.int64),
         pull_coefficient=columns.data.astype(np.float64),
+        own_link=no_terms(),
+        own_pull=no_terms(),
         body_z=np.ascontiguousarray(train.car_body_dof[:, 1], dtype=np.int64),
         body_y=np.ascontiguousarray(train.car_body_dof[:, 0], dtype=np.int64),
         body_pitch=np.ascontiguousarray(train.car_body_dof[:, 3], dtype=np.int64),
@@ -80,8 +89,13 @@ def vehicle(train: train_model.TrainModel) -> Vehicle:
     )
 
 
-def magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
-    """Magnets of one kind for the kernels."""
+def no_terms() -> Terms:
+    """No sum in which a sample has anything of its own."""
+    return Terms(_SHARED, np.zeros(1, np.int64), _SHARED, _SHARED, np.zeros((0, LANES)))
+
+
+def magnet_rows(train: train_model.TrainModel, circuit: Circuit, *, guidance: bool) -> MagnetRows:
+    """Magnets of one kind for the kernels; those that carry no current have a largest of zero."""
     magnet: Magnet = (
         train.parameters.guidance_magnet if guidance else train.parameters.suspension_magnet
     )
@@ -93,6 +107,11 @@ def magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
     if right.size != left.size or np.abs(table.x[right] - table.x[left]).max() > 1e-9:
         raise ValueError("magnets must stand in pairs, right and left at the same place")
     number = np.stack([right, left], axis=1)
+    of_kind = np.flatnonzero(table.is_guidance == guidance)
+    failed = np.zeros(table.x.size, dtype=bool)
+    failed[of_kind] = without_current(
+        circuit, table.x[of_kind], table.side[of_kind], guidance=guidance
+    )
     offset = train_model.pole_offsets(magnet)
     arm = offset if guidance else -offset
     rest = train_model.pole_static_force(train.parameters, table)[number][:, :, : offset.size]
@@ -101,17 +120,19 @@ def magnet_rows(train: train_model.TrainModel, *, guidance: bool) -> MagnetRows:
         number=number.astype(np.int64),
         translation=table.translation_dof[number].astype(np.int64),
         rotation=table.rotation_dof[number].astype(np.int64),
-        static_force=rest.sum(axis=2),
-        static_moment=(rest * arm).sum(axis=2),
-        constant=np.ascontiguousarray(
-            rest * (magnet.gap_reference / magnet.current_reference) ** 2
-        ),
+        static_force=rest.sum(axis=2).ravel(),
+        force_number=_SHARED,
+        static_moment=(rest * arm).sum(axis=2).ravel(),
+        moment_number=_SHARED,
+        constant=(rest * (magnet.gap_reference / magnet.current_reference) ** 2).ravel(),
+        constant_number=_SHARED,
         offset=offset,
         arm=arm,
         outward=np.array([1.0, -1.0 if guidance else 1.0]),
         gap_reference=magnet.gap_reference,
         current_reference=magnet.current_reference,
-        current_max=magnet.current_max,
+        current_max=np.where(failed[number].ravel(), 0.0, magnet.current_max),
+        current_number=_SHARED,
         mass=magnet.mass,
         inertia=magnet.inertia,
         is_guidance=guidance,
@@ -159,6 +180,7 @@ def law(circuit: Circuit, rows: MagnetRows, time_step: float, gains: FloatArray)
         senses=np.any(group.feed, axis=0).astype(np.int64),
         first=np.array([pair[0] for pair in pairs], dtype=np.int64),
         second=np.array([pair[-1] for pair in pairs], dtype=np.int64),
+        lags=circuit.lag > 0,
         decay=late.decay,
         command_now=late.now,
         command_before=late.before,
@@ -211,6 +233,10 @@ def footprints(
         rise=faces.slope * config.passage.speed,
         rail=flat,
         ramp=flat,
+        level=1.0,
+        sag=np.zeros(2 * x.size),
+        sag_rise=np.zeros(2 * x.size),
+        sagging=1.0,
     )
     ground = Ground(
         x=x,
@@ -243,6 +269,11 @@ def tracks(
     return met
 
 
+def mean_pole_force(rows: MagnetRows) -> float:
+    """Force of a pole at rest, mean over those of a kind [N]."""
+    return float(rows.constant.mean() * np.square(rows.current_reference / rows.gap_reference))
+
+
 def _standing_sag(
     config: Config,
     rows: MagnetRows,
@@ -257,7 +288,7 @@ def _standing_sag(
     """
     length, n_spans = config.guideway.span_length, config.guideway.n_spans
     magnet = _magnet(config, rows)
-    force = float(rows.constant.mean()) * (rows.current_reference / rows.gap_reference) ** 2
+    force = mean_pole_force(rows)
     sag, slope = np.zeros_like(x), np.zeros_like(x)
     for span in range(n_spans):
         inside = np.flatnonzero((x >= span * length) & (x < (span + 1) * length))
@@ -319,10 +350,10 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
     of_passage = stretches(config, reduced)
     always = np.logical_and.reduce([stretch.stepped for stretch in of_passage])
     damping_start, damping_column, damping = _rows(
-        _whole_and_short(_stepped_damping(reduced, way.time_step), always)
+        whole_and_short(_stepped_damping(reduced, way.time_step), always)
     )
     taken_start, taken_mode, taken = _rows(
-        _whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
+        whole_and_short(reduced.carried.T.tocsr(), always[: reduced.n_modes])
     )
     return Spans(
         n_spans=reduced.parameters.n_spans,
@@ -336,24 +367,33 @@ def spans(reduced: ReducedGuideway, config: Config) -> Spans:
         rail_z=stacked(rails[0], upright),
         rail_roll=stacked(rails[1], sideways),
         rail_y=stacked(rails[2], sideways),
+        change=np.zeros(0),
+        change_start=_SHARED,
         square=reduced.stiffness.diagonal()[:n],
         response=response[:n],
+        mode_number=_SHARED,
         carried_start=carried_start,
         carried_top=carried_top + n,
         carried=carried,
+        carried_number=_SHARED,
         stiffness_start=stiffness_start,
         stiffness_top=stiffness_top + n,
         stiffness=stiffness,
+        stiffness_number=_SHARED,
         output_column=columns[middle],
-        midspan=midspan,
+        midspan=midspan.ravel(),
         middle=middle,
-        rest=np.stack([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
-        bearing=np.stack([_relative(reduced, middle, shape) for shape in reduced.bearing]),
-        bearing_rest=reduced.bearing_rest,
+        rest=np.concatenate([reduced.rest_z, reduced.rest_roll, reduced.rest_y]),
+        in_order=np.arange(upright_column.size + sideways_column.size),
+        bearing=np.concatenate([_relative(reduced, middle, one) for one in reduced.bearing]),
+        bearing_rest=reduced.bearing_rest.ravel(),
         damping_column=damping_column,
         damping=damping,
+        damping_root=np.zeros(0),
+        root_number=_SHARED,
         taken_mode=taken_mode,
         taken=taken,
+        taken_number=_SHARED,
         stretches=_stretches(reduced, config, of_passage, damping_start, taken_start),
     )
 
@@ -380,7 +420,7 @@ def _stepped_damping(reduced: ReducedGuideway, time_step: float) -> sp.csr_array
     return damping
 
 
-def _whole_and_short(matrix: sp.csr_array, always: BoolArray) -> sp.csr_array:
+def whole_and_short(matrix: sp.csr_array, always: BoolArray) -> sp.csr_array:
     """The rows of a matrix, then the same rows without columns that some stretch does not step.
 
     The short rows are those of quiet spans.
@@ -455,14 +495,14 @@ def timing(config: Config, record_every: int) -> Timing:
     passage = config.passage
     way = course(config)
     return Timing(
-        first_step=way.first_step,
+        first_step=first_moving_step(config.control, way.first_step),
         n_steps=way.n_steps,
         time_step=way.time_step,
         speed=passage.speed,
         start=way.start,
         train_length=config.train.length,
-        gap_contact=passage.gap_contact,
-        gap_lost=passage.gap_lost,
+        gap_contact=np.full(LANES, passage.gap_contact),
+        gap_lost=np.full(LANES, passage.gap_lost),
         sections=np.ascontiguousarray(acceleration_filter(passage, way.time_step)),
         record_every=record_every,
         comfort=_comfort(config),
@@ -497,8 +537,13 @@ def empty_outcome(
     table = train.magnets
     n_magnets = table.x.size
     n_records = timing.n_steps // timing.record_every if timing.record_every else 0
-    gap = np.array([[k.gap_reference] * LANES for k in kinds])
-    current = np.array([[k.current_reference] * LANES for k in kinds])
+    gap, current = (
+        np.concatenate([np.broadcast_to(one, (1, LANES)) for one in of_kinds])
+        for of_kinds in (
+            [kind.gap_reference for kind in kinds],
+            [kind.current_reference for kind in kinds],
+        )
+    )
     history = np.zeros((n_records, 4 + 2 * n_cars + 2 * n_magnets * with_magnets, LANES))
     if with_magnets:
         of_kind = table.is_guidance.astype(np.int64)

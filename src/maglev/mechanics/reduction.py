@@ -573,7 +573,7 @@ def _relative_damping(
     return _pruned(sp.csr_array((relative + relative.T) / 2), DAMPING_DROP)
 
 
-def _rail_nodes_rows(
+def rail_nodes_rows(
     model: full.GuidewayModel, span: int
 ) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array]:
     """Rows (coefficient, dof) that read z, roll and y at the nodes of a span's rails."""
@@ -606,7 +606,7 @@ def _rest_at_midspan(
     middle = model.parameters.n_spans // 2
     at = np.array([(middle + 0.5) * model.parameters.span_length])
     up, across = (_left_out(model, reduced, row)[0] for row in model.girder_rows(at))
-    z, roll, y = (rows[:, model.span_dof[middle]] for rows in _rail_nodes_rows(model, middle))
+    z, roll, y = (rows[:, model.span_dof[middle]] for rows in rail_nodes_rows(model, middle))
     return z @ up, roll @ across, y @ across
 
 
@@ -637,7 +637,7 @@ def _rest_at_bearings(model: full.GuidewayModel, reduced: ReducedGuideway) -> Fl
     """Flexibility of the middle span's bearings by left-out modes (6, coefficient) [m/N]."""
     middle = model.parameters.n_spans // 2
     left_out = _left_out(model, reduced, _bearing_pairs(model, middle))
-    z, roll, y = (rows[:, model.span_dof[middle]] for rows in _rail_nodes_rows(model, middle))
+    z, roll, y = (rows[:, model.span_dof[middle]] for rows in rail_nodes_rows(model, middle))
     pairs = ((left_out[0], left_out[1]), (left_out[2], left_out[3]))
     return np.stack([one for mean, half in pairs for one in (z @ mean, roll @ half, y @ half)])
 
@@ -650,4 +650,4 @@ def _rail_pieces(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Coefficients (column, coefficient) of the rails' z, roll and y along one span."""
     shapes = basis[:, columns].toarray()
-    return tuple((rows @ shapes).T for rows in _rail_nodes_rows(model, span))
+    return tuple((rows @ shapes).T for rows in rail_nodes_rows(model, span))

@@ -27,6 +27,7 @@ from maglev.errors import UserError
 from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import train as train_model
 from maglev.mechanics.comfort import weighted_rms
+from maglev.mechanics.control import first_moving_step
 from maglev.mechanics.course import course
 from maglev.mechanics.irregularity import Profile
 from maglev.mechanics.reference_magnets import Poles
@@ -337,7 +338,8 @@ def passed(
     record = _blank(of, n_steps, n_steps // record_every if record_every else 0)
     state, fate = at_rest(of), record.fate
     way = course(config)
-    first = int((way.first_step - 1) * way.time_step / step)  # until then nothing moves
+    resting = first_moving_step(config.control, way.first_step) - 1
+    first = int(resting * way.time_step / step)  # until then nothing moves
     bar = tqdm(total=n_steps - first, disable=not progress, desc="reference", unit="step")
     for number, view in enumerate(views(of, first, n_steps), start=first):
         state = stepped(of, state, view, fate.status == 0)

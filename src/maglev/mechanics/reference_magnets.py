@@ -20,6 +20,7 @@ from maglev.mechanics import guideway as guideway_model
 from maglev.mechanics import timoshenko
 from maglev.mechanics import train as train_model
 from maglev.mechanics.control import circuits as grouping_of
+from maglev.mechanics.control import without_current
 from maglev.mechanics.irregularity import Profile
 from maglev.parameters import Config
 
@@ -340,11 +341,13 @@ def circuits_of(config: Config, poles: Poles, gains: FloatArray, step: float) ->
     controls = (config.control.suspension, config.control.guidance)
     groups = [grouping_of(c, m.n_poles) for c, m in zip(controls, magnets, strict=True)]
     first = np.flatnonzero(np.diff(poles.magnet, prepend=-1))
+    failed = failed_poles(config, poles)[first]
     kinds = poles.is_guidance[first].astype(int)
     same = [np.eye(m.n_poles) for m in magnets]
     mean = [np.full((m.n_poles, m.n_poles), 1 / m.n_poles) for m in magnets]
     by = [mean[k] if groups[k].mean_gap_force else same[k] for k in (0, 1)]
     kind = np.concatenate([np.full(groups[k].feed.shape[0], k) for k in kinds])
+    works = ~np.repeat(failed, [groups[k].feed.shape[0] for k in kinds])[:, None]
 
     def blocks(each: list[FloatArray]) -> sp.csr_array:
         return sp.csr_array(sp.block_diag([each[k] for k in kinds], format="csr"))
@@ -371,16 +374,28 @@ def circuits_of(config: Config, poles: Poles, gains: FloatArray, step: float) ->
             for back in sorted(set(taps[0]) | set(taps[1]))
         ),
         current=column(*[magnet.current_reference for magnet in magnets]),
-        current_max=column(*[magnet.current_max for magnet in magnets]),
+        current_max=works * column(*[magnet.current_max for magnet in magnets]),
         step=step,
     )
+
+
+def failed_poles(config: Config, poles: Poles) -> BoolArray:
+    """Which poles (pole,) belong to magnets without current."""
+    first = np.flatnonzero(np.diff(poles.magnet, prepend=-1))
+    failed = np.zeros(first.size, dtype=bool)
+    for guidance, circuit in enumerate((config.control.suspension, config.control.guidance)):
+        of_kind = np.flatnonzero(poles.is_guidance[first] == bool(guidance))
+        x = np.array([poles.x[poles.magnet == poles.magnet[first[k]]].mean() for k in of_kind])
+        side = poles.side[first[of_kind]]
+        failed[of_kind] = without_current(circuit, x, side, guidance=bool(guidance))
+    return failed[np.cumsum(np.diff(poles.magnet, prepend=poles.magnet[0]) != 0)]
 
 
 def resting(circuits: Circuits) -> Charge:
     """State of the circuits before the passage: no signal, currents at their reference."""
     zero = np.zeros_like(circuits.proportional)
     depth = max(back for back, _ in circuits.taps) + 1
-    rest = circuits.current + zero
+    rest = np.minimum(circuits.current, circuits.current_max) + zero
     return Charge(zero, zero.copy(), rest, rest.copy(), deque(maxlen=depth))
 
 

@@ -26,6 +26,7 @@ from maglev.mechanics.reference_magnets import (
     Track,
     charged,
     circuits_of,
+    failed_poles,
     poles_of,
     resting,
 )
@@ -255,7 +256,8 @@ def at_rest(of: System) -> State:
     """The train in equilibrium on rigid straight track, the guideway unloaded."""
     n_samples = of.n_samples
     ones = np.ones((1, n_samples))
-    magnets = Magnets(of.poles.gap * ones, of.poles.current * ones, of.poles.static_force * ones)
+    works = ~failed_poles(of.config, of.poles)[:, None] * ones
+    magnets = Magnets(of.poles.gap * ones, of.poles.current * works, of.poles.static_force * works)
     train = Motion.at_rest(of.train.mass.shape[0], n_samples)
     guideway = Motion.at_rest(of.guideway.mass.shape[0], n_samples)
     return State(

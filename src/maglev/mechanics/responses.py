@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.mechanics.comfort import sperling_index
+from maglev.mechanics.comfort import WEIGHTINGS, sperling_index
 from maglev.parameters import Config, Passage
-from maglev.vocabulary import RESPONSES, Response
+from maglev.vocabulary import RESPONSES, STEP_TOO_LARGE, Response
 
 GIRDER_RESPONSES = (
     "girder_displacement_z",
@@ -262,6 +262,29 @@ _FOUND: Mapping[Response, Callable[[Passages], Found]] = {
     "bearing_uplift": lambda one: Found(one.lift, one.lift_time),
 }
 """How each response follows from what is watched."""
+
+
+def not_judged(config: Config, n_samples: int) -> Passages:
+    """Passages without histories of a system for which the step is too large."""
+    n_cars = config.train.n_cars
+    more = {
+        "girder": (4,),
+        "body": (n_cars,),
+        "end": (n_cars,),
+        "weighted": (len(WEIGHTINGS), n_cars),
+        "gap": (2,),
+        "current": (2,),
+    }
+    known: dict[str, npt.NDArray] = {
+        **compared_with(config, np.nan, n_samples),
+        "status": np.full(n_samples, STEP_TOO_LARGE),
+        "lost_magnet": np.full(n_samples, -1),
+        "time": np.empty(0),
+    }
+    for name in (field.name for field in fields(Passages) if field.name not in known):
+        of_history = (0, 0) if name.endswith("_history") else more.get(name.split("_")[0], ())
+        known[name] = np.full((n_samples, *of_history), np.nan)
+    return Passages(**known)
 
 
 def in_their_order(parts: Sequence[Passages], rows: Sequence[IntArray]) -> Passages:

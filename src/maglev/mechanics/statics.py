@@ -93,3 +93,33 @@ def largest_deflection(guideway: GuidewayModel, train: TrainModel, step: float =
     nose = np.arange(0.0, length + step, step)
     on = (nose > middle - span / 2) & (nose < middle + span / 2 + train.parameters.length)
     return float(deflection(guideway, train, nose[on]).max())
+
+
+def influence(guideway: GuidewayModel, train: TrainModel, step: float = 0.5) -> FloatArray:
+    """Deflection at midspan of the middle span per unit force of each pole of the train.
+
+    Parameters
+    ----------
+    guideway, train
+        The models.
+    step
+        Distance of neighbouring places of the nose [m], as in `largest_deflection`.
+
+    Returns
+    -------
+    influence : (nose, magnet, pole)
+        Of the suspension magnets [m/N]; zero of the others.
+    """
+    length = guideway.parameters.length + train.parameters.length
+    nose = np.arange(0.0, length + step, step)
+    midspan, _ = guideway.girder_rows([midspan_of_middle_span(guideway)])
+    line = splu(guideway.stiffness.tocsc()).solve(midspan.toarray()[0])
+    magnets = train.magnets
+    offsets = pole_offsets(train.parameters.suspension_magnet)
+    found = np.zeros((nose.size, magnets.x.size, offsets.size))
+    for side in np.unique(magnets.side):
+        hung = np.flatnonzero(~magnets.is_guidance & (magnets.side == side))
+        at = nose[:, None, None] + magnets.x[hung, None] + offsets
+        u_z, _, _, _ = guideway.rail_rows(at.ravel(), int(side))
+        found[:, hung] = (u_z @ line).reshape(at.shape)
+    return found

@@ -7,6 +7,9 @@ that takes the linearised train with its circuits from one step to the next, for
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy.linalg
@@ -18,6 +21,7 @@ from maglev.mechanics.activity import top_mass, top_stiffness
 from maglev.mechanics.control import late_current
 from maglev.mechanics.linear import Block
 from maglev.mechanics.reduction import ReducedGuideway
+from maglev.mechanics.trains import Rates
 from maglev.parameters import Config
 
 DAMPING_MARGIN = 1.4
@@ -58,13 +62,18 @@ def guideway_limit(config: Config, reduced: ReducedGuideway, time_step: float) -
         Δt [s], on which the mass of a step depends.
     """
     ratio = config.guideway.damping_ratio
-    inertia = stepped_inertia(reduced, time_step)
-    square = scipy.linalg.eigvalsh(stepped_stiffness(reduced), inertia)[-1]
+    square = fastest_square(reduced, time_step)
     fastest = math.sqrt(reduced.stiffness.diagonal()[: reduced.n_modes].max(initial=1e-12))
     return min(
-        GUIDEWAY_MARGIN * _largest_phase(ratio) / math.sqrt(square),
-        _largest_phase(DAMPING_MARGIN * ratio, exact=True) / fastest,
+        GUIDEWAY_MARGIN * largest_phase(ratio) / math.sqrt(square),
+        largest_phase(DAMPING_MARGIN * ratio, exact=True) / fastest,
     )
+
+
+def fastest_square(reduced: ReducedGuideway, time_step: float) -> float:
+    """Largest squared circular frequency of the guideway with the mass of a step [1/s²]."""
+    inertia = stepped_inertia(reduced, time_step)
+    return float(scipy.linalg.eigvalsh(stepped_stiffness(reduced), inertia)[-1])
 
 
 def train_parts(config: Config) -> tuple[Block, ...]:
@@ -173,6 +182,134 @@ def samples_too_fast(
     return too_fast
 
 
+HEADROOMS = (2.6, 2.2, 1.8, 1.4, 1.2, 1.0)
+"""Multiples of all rates of the train and of its gains that are tried, from large to small [-];
+assumed."""
+
+SLOW_LAG = 10e-3
+"""A lag beyond which the current takes no part in fast motions [s]; assumed."""
+
+
+@dataclass(frozen=True)
+class Headroom:
+    """How much faster than the mean a train can be for the step.
+
+    Attributes
+    ----------
+    times
+        Common multiple of rates and gains at which the step is stable [-]; zero: none.
+    gains : (8,)
+        Mean gains, as in `train_limit`.
+    rates
+        Of the train of the configuration.
+    time_step
+        Δt [s].
+    """
+
+    times: float
+    gains: FloatArray
+    rates: Rates
+    time_step: float
+
+
+def headroom(
+    parts: tuple[Block, ...], mean: FloatArray, rates: Rates, time_step: float
+) -> Headroom:
+    """Find how much faster a train can be, whatever its lags.
+
+    Parameters
+    ----------
+    parts
+        From `train_parts`.
+    mean : (8,)
+        Gains.
+    rates
+        Of the train of the configuration.
+    time_step
+        Δt [s].
+    """
+    times = next((f for f in HEADROOMS if _all_hold(parts, f, f * mean, time_step)), 0.0)
+    return Headroom(times, mean, rates, time_step)
+
+
+def _all_hold(parts: tuple[Block, ...], times: float, gains: FloatArray, time_step: float) -> bool:
+    """Whether the step holds with rates so many times as fast, with the lags given and others."""
+    faster = [
+        replace(one, damping=times * one.damping, stiffness=times * one.stiffness) for one in parts
+    ]
+    lags = {None, 0.0, SLOW_LAG}
+    return all(
+        step_holds(tuple(_with_lag(one, lag) for one in faster), gains, time_step) for lag in lags
+    )
+
+
+def _with_lag(block: Block, lag: float | None) -> Block:
+    """The block with another lag of all its circuits [s], if one is given."""
+    if lag is None:
+        return block
+    first, second = (replace(loop, lag=lag) for loop in block.loops)
+    return replace(block, loops=(first, second))
+
+
+def trains_too_fast(
+    config: Config,
+    known: Headroom,
+    rates: Rates,
+    gains: FloatArray,
+    values: Mapping[str, FloatArray],
+) -> BoolArray:
+    """Samples of trains of their own for which the step is too large.
+
+    A train no rate or gain of which, per mass, is larger than `Headroom` allows needs no closer
+    look; any other is linearised by itself.
+
+    Parameters
+    ----------
+    config
+        What samples share beyond the values.
+    known
+        From `headroom`.
+    rates
+        Of each sample's train; what stands behind them does not count.
+    gains : (sample, 8)
+        Of each sample.
+    values : key of (sample,)
+        Numbers of each sample by dotted keys.
+
+    Returns
+    -------
+    too_fast : (sample,)
+        True where the step is too large.
+    """
+    n_samples = gains.shape[0]
+    faster = [
+        _share(own[:n_samples], mean).max(axis=1)
+        for own, mean in (
+            (rates.stiffness, known.rates.stiffness),
+            (rates.damping, known.rates.damping),
+            (rates.pull[0], known.rates.pull[0]),
+            (rates.pull[1], known.rates.pull[1]),
+        )
+    ]
+    effective = gains.copy()
+    for kind, places in enumerate(linear.GAINS_OF_KIND):
+        effective[:, places] *= faster[2 + kind][:, None]
+    closer = (np.maximum(faster[0], faster[1]) > known.times) | (
+        effective > known.times * known.gains
+    ).any(axis=1)
+    too_fast = np.zeros(gains.shape[0], dtype=bool)
+    for sample in np.flatnonzero(closer):
+        own = config.with_numbers({key: float(of_all[sample]) for key, of_all in values.items()})
+        too_fast[sample] = not step_holds(train_parts(own), gains[sample], known.time_step)
+    return too_fast
+
+
+def _share(own: FloatArray, mean: FloatArray) -> FloatArray:
+    """Rates (sample, place) over those of the mean; infinite where it has none but a sample has."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(own == 0, 0.0, own / mean)
+
+
 def step_matrix(block: Block, gains: FloatArray, time_step: float) -> FloatArray:
     """Transition matrix of a block of the linearised train over one step.
 
@@ -233,7 +370,8 @@ def step_matrix(block: Block, gains: FloatArray, time_step: float) -> FloatArray
     return np.concatenate([new_x, new_v, acceleration, a, *memories])
 
 
-def _largest_phase(ratio: float, *, exact: bool = False) -> float:
+@lru_cache(maxsize=256)
+def largest_phase(ratio: float, *, exact: bool = False) -> float:
     """Largest stable ωΔt of an oscillator with this damping ratio [-].
 
     ``exact`` is for a component mode, which is stepped with its own response and damping.

@@ -134,6 +134,34 @@ def build(train: Train) -> TrainModel:
     101
     """
     preload = _checked_preload(train)
+    assembly, cars, magnets = assemble(train)
+    rows = link_rows(assembly.links, len(assembly.names))
+    link_stiffness = np.array([link.stiffness for link in assembly.links])
+    link_damping = np.array([link.damping for link in assembly.links])
+    stiffness = assembled(rows, link_stiffness)
+    weight = np.array(assembly.weight)
+    table = _magnet_table(train, magnets, stiffness, weight, preload)
+    pole_static_force(train, table)  # refuses a magnet whose poles cannot carry its load
+    return TrainModel(
+        parameters=train,
+        mass=np.array(assembly.mass),
+        stiffness=stiffness,
+        damping=assembled(rows, link_damping),
+        link_rows=rows,
+        link_stiffness=link_stiffness,
+        link_damping=link_damping,
+        weight=weight,
+        magnets=table,
+        car_body_dof=np.array([car.body_dof for car in cars]),
+        dof_names=tuple(assembly.names),
+    )
+
+
+def assemble(train: Train) -> tuple[Assembly, list[Car], list[tuple[int, HungMagnet]]]:
+    """Bodies and links of the train, its cars, and the car and freedoms of each magnet.
+
+    Magnets are in the order of `MagnetTable`.
+    """
     assembly = Assembly()
     cars: list[Car] = []
     magnets: list[tuple[int, HungMagnet]] = []
@@ -166,27 +194,7 @@ def build(train: Train) -> TrainModel:
         magnets += [(number, magnet) for magnet in car.magnets]
         cars.append(car)
     magnets.sort(key=lambda item: (item[1].is_guidance, -item[1].side, item[0], item[1].station))
-
-    rows = link_rows(assembly.links, len(assembly.names))
-    link_stiffness = np.array([link.stiffness for link in assembly.links])
-    link_damping = np.array([link.damping for link in assembly.links])
-    stiffness = assembled(rows, link_stiffness)
-    weight = np.array(assembly.weight)
-    table = _magnet_table(train, magnets, stiffness, weight, preload)
-    pole_static_force(train, table)  # refuses a magnet whose poles cannot carry its load
-    return TrainModel(
-        parameters=train,
-        mass=np.array(assembly.mass),
-        stiffness=stiffness,
-        damping=assembled(rows, link_damping),
-        link_rows=rows,
-        link_stiffness=link_stiffness,
-        link_damping=link_damping,
-        weight=weight,
-        magnets=table,
-        car_body_dof=np.array([car.body_dof for car in cars]),
-        dof_names=tuple(assembly.names),
-    )
+    return assembly, cars, magnets
 
 
 def pole_offsets(magnet: Magnet) -> FloatArray:
@@ -210,7 +218,11 @@ def pole_offsets(magnet: Magnet) -> FloatArray:
     return (0.5 * (magnet.n_poles - 1) - np.arange(magnet.n_poles, dtype=float)) * magnet.pole_pitch
 
 
-def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
+def pole_static_force(
+    train: Train,
+    magnets: MagnetTable,
+    at_rest: tuple[FloatArray, FloatArray] | None = None,
+) -> FloatArray:
     """Force of each pole at rest.
 
     The front and the rear half of a magnet each pull evenly; the difference of the halves carries
@@ -223,10 +235,12 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
         Parameters of the train.
     magnets
         Static force and moment of each magnet.
+    at_rest : (..., magnet), (..., magnet)
+        Other forces [N] and moments [N m], such as those of many trains.
 
     Returns
     -------
-    force : (magnet, pole)
+    force : (..., magnet, pole)
         Attraction of each pole [N], poles from the front; where the two kinds differ in their
         number of poles, the rows of the kind with fewer end in zeros.
 
@@ -245,20 +259,21 @@ def pole_static_force(train: Train, magnets: MagnetTable) -> FloatArray:
     True
     """
     kinds = (train.suspension_magnet, train.guidance_magnet)
-    force = np.zeros((magnets.x.size, max(kind.n_poles for kind in kinds)))
+    whole, turning = at_rest or (magnets.static_force, magnets.static_moment)
+    force = np.zeros((*whole.shape, max(kind.n_poles for kind in kinds)))
     for is_guidance, kind in enumerate(kinds):
         rows = np.flatnonzero(magnets.is_guidance == bool(is_guidance))
         offset = pole_offsets(kind)
         lever = np.abs(offset).sum()
-        moment = magnets.static_moment[rows, None]
+        moment = turning[..., rows, None]
         if lever == 0 and np.any(moment != 0):
             raise UserError(
                 "train.suspension_magnet.n_poles must be at least 2 to carry a moment at rest, "
                 f"got {kind.n_poles}"
             )
         uneven = moment * np.sign(offset) / lever if lever > 0 else 0.0
-        force[rows, : kind.n_poles] = magnets.static_force[rows, None] / kind.n_poles + uneven
-        least = force[rows, : kind.n_poles].min()
+        force[..., rows, : kind.n_poles] = whole[..., rows, None] / kind.n_poles + uneven
+        least = force[..., rows, : kind.n_poles].min()
         if not least > 0:
             raise UserError(
                 f"each pole must attract at rest, got {least:g} N at a pole of a "

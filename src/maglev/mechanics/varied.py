@@ -7,15 +7,16 @@ share one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from maglev.arrays import FloatArray, IntArray
+from maglev.arrays import BoolArray, FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.parameters import Config
+from maglev.parameters import Config, Parameters
 
 Cost = Literal["sample", "guideway", "rebuild"]
 """What a number costs that differs from sample to sample, from nothing much to a new system."""
@@ -28,19 +29,69 @@ _PLACES = (
     "train.n_cars",
     "train.car_pitch",
     "train.bogie.c_frame_spacing",
+    "train.car_body.end_distance",
     *(f"train.{kind}_magnet.{name}" for kind in ("suspension", "guidance") for name in _POLES),
 )
-"""Numbers of the train that say where poles are: tables of the whole run stand on them."""
+"""Numbers of the train that say where poles and ends of cars are, which all samples share."""
 
 _ALIKE = (
     "passage.gap_contact",
     "passage.gap_lost",
-    *(f"control.{kind}.lag" for kind in ("suspension", "guidance")),
+    *(
+        f"control.{kind}.{name}"
+        for kind in ("suspension", "guidance")
+        for name in ("lag", "failed_magnets")
+    ),
 )
 """Numbers beyond the train's that each sample has in its lane."""
 
 LEVELS = ("coefficient", "roughness")
 """Factors of a spectrum: the irregularity goes with their root."""
+
+
+ENDS = {"damping_ratio": (0.0, math.inf), "bearing": (0.25, 4.0), "": (0.6, 1.6)}
+"""Multiples of the configured number that the basis is good for: of the damping, which changes no
+shape, of bearings, of all others [-]; assumed, checked in the tests."""
+
+_OF_A_SECTION = (
+    "elastic_modulus",
+    "poisson_ratio",
+    "density",
+    "area",
+    "second_moment_vertical",
+    "second_moment_lateral",
+    "torsion_constant",
+    "polar_inertia",
+    "shear_coefficient_vertical",
+    "shear_coefficient_lateral",
+)
+GUIDEWAY = (
+    "damping_ratio",
+    *(f"girder.{name}" for name in _OF_A_SECTION),
+    # others change the rail's shapes between its nodes, which all samples share
+    *(
+        f"rail.section.{name}"
+        for name in ("elastic_modulus", "density", "torsion_constant", "polar_inertia")
+    ),
+    "rail.connector_mass",
+    "bearing.vertical_stiffness",
+    "bearing.lateral_stiffness",
+    "bearing.fixed_longitudinal_stiffness",
+    "bearing.free_longitudinal_stiffness",
+    "pier.width_x",
+    "pier.width_y",
+    "pier.cap_width_y",
+    "pier.elastic_modulus",
+    "pier.poisson_ratio",
+    "pier.density",
+    "pier.shear_coefficient",
+)
+"""Numbers of the guideway that change its matrices but not its nodes."""
+
+
+def ends_of(key: str) -> tuple[float, float]:
+    """Smallest and largest multiple of a number of the guideway that the basis is good for [-]."""
+    return next(ends for name, ends in ENDS.items() if key.startswith(name))
 
 
 def cost_of(config: Config, keys: Iterable[str]) -> dict[str, Cost]:
@@ -90,7 +141,23 @@ def _cost(config: Config, key: str) -> Cost:
         return "rebuild" if key in _PLACES else "sample"
     if section == "irregularity":
         return "sample" if key.split(".")[-1] in LEVELS else "rebuild"
+    if section == "guideway":
+        return "guideway" if in_a_basis(config, key) else "rebuild"
     return "sample" if key in _ALIKE else "rebuild"
+
+
+def in_a_basis(config: Config, key: str) -> bool:
+    """Whether guideways that differ in a number share a basis."""
+    if key == "guideway.damping_ratio":  # without any, there is none to scale
+        return config.guideway.damping_ratio > 0
+    return key.removeprefix("guideway.") in GUIDEWAY
+
+
+def beyond_the_basis(config: Config, key: str, numbers: FloatArray) -> BoolArray:
+    """Samples whose number of the guideway is not within what a basis is good for (sample,)."""
+    low, high = ends_of(key.removeprefix("guideway."))
+    mean, _ = config.number_at(key)
+    return (numbers < low * mean) | (numbers > high * mean)
 
 
 def checked_values(
@@ -149,3 +216,18 @@ def equal_samples(columns: Iterable[FloatArray], n_samples: int) -> list[IntArra
     _, group = np.unique(table, axis=0, return_inverse=True)
     group = group.ravel()
     return [np.flatnonzero(group == number) for number in range(int(group.max()) + 1)]
+
+
+def with_arrays(section: Parameters, arrays: Mapping[str, float | FloatArray]) -> Any:
+    """Copy of parameters with arrays (sample,) in place of numbers at dotted keys, unchecked."""
+    inner: dict[str, dict[str, float | FloatArray]] = {}
+    changed: dict[str, Any] = {}
+    for key, array in arrays.items():
+        first, _, rest = key.partition(".")
+        if rest:
+            inner.setdefault(first, {})[rest] = array
+        else:
+            changed[first] = array
+    for name, nested in inner.items():
+        changed[name] = with_arrays(getattr(section, name), nested)
+    return section.model_copy(update=changed)

@@ -10,7 +10,7 @@ import xarray as xr
 from maglev.errors import UserError
 from maglev.parameters import Config
 from maglev.stage import Input, Stage
-from maglev.stages.tables import markdown, of_track
+from maglev.stages.tables import SHOWN, markdown, of_track
 from maglev.vocabulary import METHODS, RESPONSE_UNITS, RESPONSE_WORDS
 
 _ENDS = ("", "_low", "_high")
@@ -18,9 +18,6 @@ _OF_STATE = ("definition", "origin", "state_response", "threshold", "target")
 _NAMES = tuple(
     f"{name}{end}" for name in ("probability", "held_probability", "beta") for end in _ENDS
 )
-
-SHOWN: Mapping[str, tuple[float, str]] = {"m": (1e3, "mm"), "m s-2": (1.0, "m/s²"), "1": (1.0, "")}
-"""Scale and unit for a person of a unit of a response."""
 
 
 def dataset(config: Config, limit_states: Mapping[tuple[str, str], xr.Dataset]) -> xr.Dataset:

@@ -7,6 +7,7 @@ standard form.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -16,13 +17,14 @@ from scipy.stats import norm
 
 from maglev.arrays import FloatArray, IntArray
 from maglev.errors import UserError
-from maglev.laws import Distribution, Normal
+from maglev.laws import Discrete, Distribution, Normal
+from maglev.mechanics.varied import cost_of
 from maglev.parameters import Case, Config, Gains
 from maglev.stages.randomness import generator
 from maglev.uncertainty.dependence import at_normal, nataf
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import PointSet, gf_points
-from maglev.vocabulary import GAINS
+from maglev.vocabulary import BASELINE, GAINS
 
 GAIN_COLUMNS = tuple(f"gains.{name}" for name in Gains.model_fields)
 """Dotted keys of the gains in the order of the columns that `maglev.simulate` takes."""
@@ -173,6 +175,50 @@ def others_at(config: Config, case: str, values: FloatArray) -> dict[str, FloatA
         for column, key in enumerate(parameters(config, case))
         if key not in _FOUR_GAINS
     }
+
+
+PREPARATION = 0.5
+"""Process time of a system that is built anew, with five spans [s]; docs/benchmarks/passage.md."""
+
+
+def cost_words(config: Config, case: str) -> str:
+    """Sentence on the cost of random quantities that ask for systems built anew; empty for none.
+
+    Parameters
+    ----------
+    config
+        The configuration.
+    case
+        Name of the case.
+
+    Examples
+    --------
+    >>> cost_words(Config(), "validation")
+    ''
+    """
+    own, laws = config.of_case(case), laws_of(config, case)
+    others = [key for key in laws if not key.startswith("gains.")]
+    dear = [key for key, cost in cost_of(own, others).items() if cost == "rebuild"]
+    if not dear:
+        return ""
+    chosen = case_of(config, case)
+    runs = sum(
+        n_samples(config, case) if method == BASELINE else _largest(config, method)
+        for method in chosen.possible_methods
+    )
+    values = [laws[key] for key in dear]
+    if all(isinstance(law, Discrete) for law in values):
+        runs = min(runs, math.prod(len(law.values) for law in values if isinstance(law, Discrete)))
+    return (
+        f"{', '.join(dear)}: every value asks for a system built anew, {runs} of them, about "
+        f"{runs * PREPARATION / 60:.0f} min of one core beside the passages"
+    )
+
+
+def _largest(config: Config, method: str) -> int:
+    """Largest number of runs of a method with a surrogate."""
+    design = getattr(config.study, method)
+    return int(design.n_runs if method == "osm" else design.n_largest)
 
 
 def n_samples(config: Config, case: str) -> int:

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
+SHOWN: Mapping[str, tuple[float, str]] = {"m": (1e3, "mm"), "m s-2": (1.0, "m/s²"), "1": (1.0, "")}
+"""Scale and unit for a person of a unit of a response."""
+
 
 def number(value: Any) -> str:
     """A number with five digits; a word for NaN and infinity."""
