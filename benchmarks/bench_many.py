@@ -230,7 +230,8 @@ def of_train(s: int, seed: int) -> list[dict]:
                 for response in range(error.shape[1])
             ]
         if len(points) >= N_LARGEST:
-            return [row | of_indices(surrogate, seed) for row in rows]
+            indices = of_indices(surrogate, seed)
+            return [row | indices for row in rows]
         start = time.process_time()
         chosen = tail_batch(surrogate, points, candidates, settings.batch_size)
         choosing += time.process_time() - start
@@ -345,7 +346,7 @@ def run_model(options: argparse.Namespace) -> None:
             continue
         start = time.perf_counter()
         judged = judged_design(config, seed, truth, store, options.threads)
-        judged.attrs["size"] = f"{options.cars} cars, {options.spans} spans"
+        judged.attrs["size"] = f"Cars: {options.cars}, spans: {options.spans}"
         judged.attrs["n_samples"] = options.samples
         datasets.write_netcdf(judged, path)
         print(f"model, seed {seed}: {time.perf_counter() - start:.0f} s", flush=True)
@@ -496,46 +497,47 @@ def draw(worst: pd.Series, page: Path) -> None:
         figure.savefig(page.with_suffix(".pdf"))
 
 
+def both(errors: Array) -> str:
+    """Median and worst of the seeds; a dash where the baseline is too small for the limit."""
+    if np.isnan(errors).any():
+        return "—"
+    return f"{np.median(errors):.3f} / {errors.max():.3f}"
+
+
 def page_of_model(kept: list[Path]) -> list[str]:
-    """Table of the largest size whose designs are kept."""
+    """Tables of the largest baseline whose designs are kept."""
     found = [xr.load_dataset(path) for path in kept]
-    found = [one for one in found if one.attrs["n_samples"] == max(
-        other.attrs["n_samples"] for other in found
-    )]  # fmt: skip
-    levels = found[0]["failure_probability"].values
+    largest = max(one.attrs["n_samples"] for one in found)
+    found = [one for one in found if one.attrs["n_samples"] == largest]
+    levels, n_runs = (found[0][name].values for name in ("failure_probability", "step_n_runs"))
     error = np.abs(np.stack([one["step_held_limit_error"].values[0] for one in found]))
-    n_runs = found[0]["step_n_runs"].values[0]
-    noise = found[0]["reference_held_half_width"].values
+    rmse = np.stack([(one["step_rmse"] / one["sigma"]).values[0] for one in found])
+    noise = found[0]["reference_held_half_width"].values[:, -1]
     worst = error.max(axis=2)
-    share = error[:, -1, :, -1]
+    quantities = ", ".join(f"`{key}`" for key in (*RANDOM, *BOUNDED))
     return [
         "## The model: twelve random quantities",
         "",
-        f"{found[0].attrs['size']}, the track of the seed: {', '.join([*RANDOM, *BOUNDED])};",
-        f"laws as in the script.  {len(found)} seeds of the points against a baseline of",
-        f"{found[0].attrs['n_samples']} runs on its own points, limits given that levitation",
-        "holds: largest error of the six in standard deviations, median / worst of the seeds.",
+        f"{quantities}; laws as in the script.  {found[0].attrs['size']}, the track of the seed.",
+        f"Seeds of the points: {len(found)}; baseline: {largest} runs, limits on its own points",
+        "and given that levitation holds.  Error of the limits and root mean square error, largest",
+        "of the six responses, in standard deviations: median / worst of the seeds.",
         "",
         *table(
-            ["runs", *(f"{level:g}" for level in levels)],
+            ["runs", *(f"{level:g}" for level in levels), "RMSE"],
             [
-                [n]
-                + [
-                    f"{np.median(worst[:, step, k]):.3f} / {worst[:, step, k].max():.3f}"
-                    for k in range(levels.size)
-                ]
-                for step, n in enumerate(n_runs)
+                [n, *map(both, worst[:, step].T), both(rmse[:, step].max(axis=1))]
+                for step, n in enumerate(n_runs[0])
             ],
         ),
-        f"Half the baseline's own interval is {noise[:, -1].min():.2f} to",
-        f"{noise[:, -1].max():.2f} σ at {levels[-1]:g}.  Each limit there by {n_runs[-1]} runs,",
-        "median / worst:",
+        f"By {n_runs[0, -1]} runs, each response at {levels[-1]:g}, and half the baseline's own",
+        "interval there:",
         "",
         *table(
-            ["response", "error [σ]"],
+            ["response", "error [σ]", "baseline [σ]", "RMSE [σ]"],
             [
-                [name.replace("_", " "), f"{np.median(one):.3f} / {one.max():.3f}"]
-                for name, one in zip(PAPER_RESPONSES, share.T, strict=True)
+                [name.replace("_", " "), both(error[:, -1, k, -1]), f"{noise[k]:.2f}", both(one)]
+                for k, (name, one) in enumerate(zip(PAPER_RESPONSES, rmse[:, -1].T, strict=True))
             ],
         ),
     ]
