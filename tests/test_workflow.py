@@ -36,6 +36,7 @@ cases:
   group_lumped: null
   lag_2ms: {n_spans: 1, n_samples: 2}
   random_track: {n_spans: 1, methods: [mcm], n_samples: 2, track: random}
+  fast: {n_spans: 1, sweep: {passage.speed: [400 km/h, 430 km/h]}}
 """
 
 
@@ -92,16 +93,19 @@ def test_a_dry_run_of_all_lists_every_step_of_the_method(fresh):
     assert jobs.items() >= {
         "run_config": 1,
         "irregularity": 1, "guideway_modes": 1, "passage": 1, "deflection": 1, "dynamic_factor": 1,
-        "baseline_points": 3, "representative_points": 3, "initial_points": 5,
-        "candidate_points": 4, "baseline_chunk": 4, "baseline": 3, "design": 5, "track_runs": 4,
-        "surrogate": 5, "eev": 5, "density": 8, "limits": 8, "limit_states": 8,
+        "baseline_points": 3, "representative_points": 5, "initial_points": 7,
+        "candidate_points": 6, "baseline_chunk": 4, "baseline": 3, "design": 7, "track_runs": 4,
+        "surrogate": 7, "eev": 7, "density": 10, "limits": 10, "limit_states": 10,
         "accuracy": 2, "track_split": 1, "statistics_check": 1, "table1": 1, "paper_and_ours": 1,
         "prediction": 2, "stability": 1, "control_study": 1, "stiffness_check": 1,
         "fig7": 1, "fig8": 1, "histories": 1, "gaps": 1, "modes": 1, "all": 1,
         "fig9": 1, "fig10": 1, "fig11": 1, "fig12": 1, "fig15": 1, "fig16": 1, "fig_sobol": 1,
         "fig_stability": 1, "fig_accuracy": 1, "fig_scatter": 1, "fig_track_split": 1,
         "fig_control_density": 1, "fig_control_limits": 1, "fig_stiffness": 1,
-        "limit_state_table": 1, "fig_exceedance": 4,
+        "limit_state_table": 1, "limits_table": 1,
+        "figures_validation": 1, "figures_cov_014": 1, "figures_lag_2ms": 1,
+        "figures_random_track": 1, "figures_fast": 1, "figures_fast_1": 1, "figures_fast_2": 1,
+        "mean_run": 2, "sweep": 1,
         "tracks": 1, "line": 1, "fig_tracks": 1, "fig_track_limits": 1,
         "density_in_time": 1, "fig_in_time": 1,
     }.items()  # fmt: skip
@@ -117,6 +121,64 @@ def test_a_single_case_and_method_needs_only_its_own_chain(fresh):
         "stage_config": 2, "method_config": 3, "initial_points": 1, "candidate_points": 1,
         "design": 1, "surrogate": 1, "limits": 1,
     }  # fmt: skip
+
+
+OWN = """\
+extends: test.yaml
+only: [mine]
+cases:
+  mine: {{n_spans: 1, {more}}}
+"""
+OF_PAPER = (
+    "table1", "paper_and_ours", "control_study", "tracks", "line", "fig_in_time",
+    *(f"fig{number}" for number in range(9, 17)),
+)  # fmt: skip
+"""What compares cases that are not there."""
+
+
+@pytest.mark.parametrize(
+    ("more", "cases", "names"),
+    [
+        ("methods: [mcm]", ["mine"], ["density", "exceedance", "limits", "scatter"]),
+        ("methods: [asm]", ["mine"], ["density", "exceedance", "limits", "sobol_asm"]),
+        (
+            "methods: [mcm, asm]",
+            ["mine"],
+            "density exceedance limits sobol_asm scatter accuracy prediction".split(),
+        ),
+        (
+            "methods: [asm], sweep: {passage.speed: [400 km/h, 430 km/h]}",
+            ["mine_1", "mine_2"],
+            ["density", "exceedance", "limits", "sobol_asm"],
+        ),
+        (
+            "methods: [mcm, asm], track: random",
+            ["mine"],
+            ["density", "exceedance", "limits", "scatter", "track_split"],
+        ),
+    ],
+)
+def test_a_case_of_any_name_has_every_figure_and_table_of_its_methods(fresh, more, cases, names):
+    (fresh.folder / "config" / "own.yaml").write_text(OWN.format(more=more))
+    code, text = fresh.snakemake("all", "--dry-run", config="config/own.yaml")
+    assert code == 0, text
+    (line,) = (one for one in text.splitlines() if one.startswith("    input: results/test/run_c"))
+    wanted = line.removeprefix("    input: ").split(", ")
+    drawn = [f"results/test/figures/{case}/{name}.png" for case in cases for name in names]
+    if "sweep" in more:
+        drawn.append("results/test/figures/mine/sweep.png")
+        assert "results/test/mine/sweep.nc" in wanted
+    assert sorted(drawn) == sorted(
+        one for one in wanted if one.count("/") == 4 and "figures" in one
+    )
+    assert {"results/test/tables/limits.nc", "results/test/tables/limit_states.nc"} <= set(wanted)
+    rules = {one.split()[0] for one in text.split("Job stats:")[1].splitlines() if one.split()}
+    assert not rules & set(OF_PAPER)
+    assert not any("validation/" in one and "/validation/" not in one for one in wanted)
+    single = f"results/test/figures/{cases[-1]}/{names[-1]}.pdf"
+    code, text = fresh.snakemake(single, "--dry-run", config="config/own.yaml")
+    assert code == 0, text
+    assert f"figures_{cases[-1]}  " in text
 
 
 def test_the_truth_of_all_cases_is_a_target_of_its_own(fresh):

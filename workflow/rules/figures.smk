@@ -116,39 +116,14 @@ DRAWN = {
     "fig_track_split": (
         "track_split",
         "what random gains and a random track contribute",
-        [file_of("track_split", case=case) for case in TRACK_CASES[:1]],
+        of_first_split(),
     ),
-    **{
-        f"fig_in_time{f'_{case}' if k else ''}": (
-            "in_time",
-            f"densities over the time of a passage of '{case}'",
-            [file_of("density_in_time", case=case)],
-        )
-        for k, case in enumerate(followed_cases())
-    },
+    "fig_in_time": (
+        "in_time",
+        "densities over the time of a passage",
+        [file_of("density_in_time", case=case) for case in followed_cases()[:1]],
+    ),
 }
-
-
-def drawn_from(case: str):
-    """Function that finds the files of every figure of a case, by its name."""
-
-    def found(wildcards) -> dict[str, list[str]]:
-        return {name: files for name, (_, files) in figures_of_case(case).items()}
-
-    return found
-
-
-def words_of(case: str):
-    """Function that writes what `maglev figures` is given for all figures of a case."""
-
-    def written(wildcards, input, output) -> str:
-        folder = Path(output[0]).parent
-        return " + ".join(
-            " ".join([module, str(folder / name), *input[name]])
-            for name, (module, _) in figures_of_case(case).items()
-        )
-
-    return written
 
 
 for figure, (module, words, files) in DRAWN.items():
@@ -180,6 +155,8 @@ for figure, (module, words, files) in DRAWN.items():
 
 # all figures of a case in one job, whichever of them is asked for: most of its time is spent once
 for case in parameters.cases:
+    if not figures_of_case(case):
+        continue
 
     rule:
         name:

@@ -66,6 +66,17 @@ def possible(stage, case: str) -> bool:
     )
 
 
+def of_split(case: str) -> list[str]:
+    """The file of a case on what its track contributes, if it has one."""
+    stage = STAGES["track_split"]
+    return [file_of("track_split", case=case)] if possible(stage, case) else []
+
+
+def of_first_split() -> list[str]:
+    """The first such file of any case."""
+    return [file for case in CASES for file in of_split(case)][:1]
+
+
 def followed_cases() -> list[str]:
     """Cases whose responses are followed over the time of a passage."""
     stage = STAGES["density_in_time"]
@@ -74,10 +85,11 @@ def followed_cases() -> list[str]:
 
 def cases_of(stage) -> list[str]:
     """Cases that a stage of each case is made for."""
+    swept = [case for case in SWEEPS if all(map(methods_of, swept_cases(case)))]
     if stage.name == "sweep":
-        return SWEEPS
+        return swept
     if stage.name == "mean_run":
-        return [one for case in SWEEPS for one in swept_cases(case)]
+        return [one for case in swept for one in swept_cases(case)]
     return [case for case in CASES if possible(stage, case)]
 
 
@@ -92,7 +104,9 @@ def results() -> list[str]:
         wildcards = set(re.findall(r"{(\w+)}", FILES[name]))
         if name == "control_study" and not CONTROL_CASES:
             continue
-        if name in ("limits_table", "limit_state_table") and not CASES:
+        if name in ("limits_table", "limit_state_table") and not any(
+            map(methods_of, CASES)
+        ):
             continue
         if not wildcards and (stage.of == "run" or possible(stage, TABLE_CASE)):
             files.append(file_of(name))
@@ -106,10 +120,13 @@ def results() -> list[str]:
 def figures_of_case(case: str) -> dict[str, tuple[str, list[str]]]:
     """Figures that a case has by its methods: name of the file, module and files it is drawn from.
 
-    A sweep has one figure, and the cases that it makes have theirs.
+    A sweep has one figure, and the cases that it makes have theirs; a case whose methods cannot be
+    carried out has none.
     """
-    if case in SWEEPS:
+    if case in cases_of(STAGES["sweep"]):
         return {"sweep": ("sweep", [file_of("sweep", case=case)])}
+    if not methods_of(case):
+        return {}
 
     def of(*names: str) -> list[str]:
         return [file for one in names for file in of_methods(one, case)]
@@ -125,6 +142,10 @@ def figures_of_case(case: str) -> dict[str, tuple[str, list[str]]]:
     if methods_of(case, (BASELINE,)):
         file = file_of("baseline", case=case, method=BASELINE)
         figures["scatter"] = ("scatter", [file])
+    if case in followed_cases():
+        figures["in_time"] = ("in_time", [file_of("density_in_time", case=case)])
+    if of_split(case):
+        figures["track_split"] = ("track_split", of_split(case))
     if judged(case):
         for name in ("accuracy", "prediction"):
             figures[name] = (name, [file_of(name, case=case)])
@@ -138,3 +159,25 @@ def figures_of_study() -> list[str]:
         f"{case}/{name}" for case in parameters.cases for name in figures_of_case(case)
     ]
     return [f"<results>/figures/{name}.png" for name in (*of_paper, *of_cases)]
+
+
+def drawn_from(case: str):
+    """Function that finds the files of every figure of a case, by its name."""
+
+    def found(wildcards) -> dict[str, list[str]]:
+        return {name: files for name, (_, files) in figures_of_case(case).items()}
+
+    return found
+
+
+def words_of(case: str):
+    """Function that writes what `maglev figures` is given for all figures of a case."""
+
+    def written(wildcards, input, output) -> str:
+        folder = Path(output[0]).parent
+        return " + ".join(
+            " ".join([module, str(folder / name), *input[name]])
+            for name, (module, _) in figures_of_case(case).items()
+        )
+
+    return written

@@ -85,7 +85,7 @@ def _table(axis: Axes, at: xr.Dataset, methods: Sequence[str], shown: labels.Sho
             ]
         )
     colours = [labels.METHOD_STYLE[name]["color"] for name in methods]
-    style.table(axis, rows, (0.0, 0.25, 0.37, 0.49, 0.63, 0.765), colours, 0.17)
+    style.table(axis, rows, (0.0, 0.24, 0.365, 0.5, 0.64, 0.765), colours, 0.17)
 
 
 def _noise(baseline: xr.Dataset) -> float:

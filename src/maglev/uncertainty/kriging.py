@@ -230,6 +230,30 @@ class Kriging:
         explained = self._whitened(response, rows).T @ self._whitened(response, columns)
         return self.deviation[response] ** 2 * (prior - explained)
 
+    def influence(self, response: int, points: npt.ArrayLike) -> FloatArray:
+        """Share of each training value in the posterior mean at points.
+
+        Parameters
+        ----------
+        response
+            Which response.
+        points : (point, parameter)
+            Standardised points [-].
+
+        Returns
+        -------
+        influence : (sample, point)
+            K⁻¹ k [-]: the change of a prediction per change of a training value, the mean kept.
+
+        Raises
+        ------
+        UserError
+            If points are not finite or have another number of parameters.
+        """
+        points = checked_points(points, self.points.shape[1])
+        prior = self._prior(response, self.points, points)
+        return cho_solve((self.factor[response], True), prior)
+
     def _prior(self, response: int, rows: FloatArray, columns: FloatArray) -> FloatArray:
         """Prior covariance (row, column) of the standardised response."""
         length = self.length[response]
