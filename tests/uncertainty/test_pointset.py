@@ -106,6 +106,16 @@ def test_many_inputs_keep_equal_weights_and_every_stratum_its_centre(s):
     assert_allclose(np.sort(inputs.to_unit_cube(found.points), axis=0), centres, rtol=1e-9)
 
 
+def test_points_of_four_inputs_are_rearranged_counted_and_rearranged_bit_by_bit():
+    n, equal = 100, np.full(100, 0.01)
+    found = gf_points(NORMAL, n, np.random.default_rng(5), counting=2**14)
+    rng = np.random.default_rng(5)
+    first = rearranged(sobol_points(NORMAL, n, rng).points, equal, NORMAL)
+    probability, _, _ = voronoi_probability(first, NORMAL, rng, 2**14)
+    assert_array_equal(found.probability, probability)
+    assert_array_equal(found.points, rearranged(first, probability, NORMAL))
+
+
 def test_voronoi_probability_on_a_line_is_the_probability_between_midpoints():
     line = Marginals([stats.norm(2.0, 3.0)])
     u = np.array([-1.5, -0.2, 0.3, 1.9])

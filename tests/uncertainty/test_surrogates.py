@@ -215,6 +215,16 @@ def test_likelihood_of_many_inputs_and_its_slope_are_scikit_learns(theta):
     assert_allclose(ours[1], theirs[1], atol=1e-9 * np.abs(theirs[1]).max())
 
 
+def test_four_inputs_are_searched_by_scikit_learn_bit_by_bit(monkeypatch):
+    points = np.random.default_rng(6).standard_normal((30, 4))
+    found = fit_kriging(points, responses(points))
+    monkeypatch.setattr(kriging, "_likelihood", None)
+    again = fit_kriging(points, responses(points))
+    assert_array_equal(again.length, found.length)
+    with pytest.raises(TypeError):
+        fit_kriging(np.random.default_rng(6).standard_normal((30, 5)), responses(points))
+
+
 def test_search_in_many_inputs_ends_where_that_of_scikit_learn_does(monkeypatch):
     points = np.random.default_rng(4).standard_normal((60, 6))
     values = responses(points)
