@@ -238,6 +238,17 @@ KNOWN = " or ".join(", ".join(f"'{name}'" for name in RESPONSES).rsplit(", ", 1)
             "choose more runs than there are candidates",
         ),
         (
+            "{study: {asm: {n_candidates: 110}}, cases: {six: {random: {"
+            "gains.suspension_proportional: {coefficient_of_variation: 0.1}, "
+            "gains.suspension_derivative: {coefficient_of_variation: 0.1}, "
+            "gains.guidance_proportional: {coefficient_of_variation: 0.1}, "
+            "gains.guidance_derivative: {coefficient_of_variation: 0.1}, "
+            "train.bogie.mass: {coefficient_of_variation: 0.1}, "
+            "train.rod.mass: {coefficient_of_variation: 0.1}}, methods: [asm]}}}",
+            "study.asm.n_candidates must be at least 120, the largest number of runs of the 6 "
+            "random quantities of cases.six, got 110; set more, or study.asm.n_largest",
+        ),
+        (
             "study: {failure_probability: [0.01, 0.1]}",
             "study.failure_probability must fall from value to value, got [0.01, 0.1]",
         ),

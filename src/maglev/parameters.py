@@ -984,6 +984,10 @@ class Validation(Parameters):
 SurrogateKind = Literal[Surrogate, "best"]
 """A surrogate; ``best``: for each response the one with the least leave-one-out error."""
 
+LARGEST_AT_LEAST, LARGEST_PER_QUANTITY = 104, 20
+"""Largest number of runs of an adaptive design of ours where none is given: at least, and for each
+random quantity; docs/benchmarks/many.md."""
+
 _COUNTED = 2**14
 """Largest GF point set, and smallest number of points that count its Voronoi cells; assumed."""
 
@@ -1012,7 +1016,7 @@ class PaperDesign(Parameters):
 
     n_initial: int = _count(50, "runs of the first design, at most", minimum=8, maximum=_COUNTED)
     initial_per_gain: int = _count(
-        15, "runs of the first design for each random gain, at most", minimum=8
+        15, "runs of the first design for each random quantity, at most", minimum=8
     )
     n_candidates: int = _count(
         1000, "GF points that rounds choose from", minimum=8, maximum=_COUNTED
@@ -1034,7 +1038,7 @@ class TailDesign(Parameters):
 
     n_initial: int = _count(40, "runs of the first design, at most", minimum=8, maximum=_COUNTED)
     initial_per_gain: int = _count(
-        12, "runs of the first design for each random gain, at most", minimum=8
+        12, "runs of the first design for each random quantity, at most", minimum=8
     )
     n_candidates: int = _count(16_384, "Sobol' points that rounds choose from", minimum=8)
     batch_size: int = _count(8, "runs of one round")
@@ -1048,7 +1052,11 @@ class TailDesign(Parameters):
         gt=0,
     )
     n_rounds: int = _count(3, "rounds in a row in which the limits must be settled to stop")
-    n_largest: int = _count(104, "largest number of runs", minimum=8)
+    n_largest: int | None = Field(
+        None,
+        description="largest number of runs; null: 20 for each random quantity, 104 at least",
+        ge=8,
+    )
     responses: tuple[Response, ...] | None = Field(
         None,
         description="responses whose limits drive; null: study.responses and those of the limit "
@@ -1056,6 +1064,16 @@ class TailDesign(Parameters):
         min_length=1,
     )
     surrogate: SurrogateKind = Field("best", description="surrogate of the finished design")
+
+    def largest(self, n_quantities: int) -> int:
+        """Largest number of runs of a case with so many random quantities.
+
+        Examples
+        --------
+        >>> TailDesign().largest(4), TailDesign().largest(12)
+        (104, 240)
+        """
+        return self.n_largest or max(LARGEST_AT_LEAST, LARGEST_PER_QUANTITY * n_quantities)
 
 
 class Tracks(Parameters):
@@ -1146,17 +1164,21 @@ class Study(Parameters):
             )
         if self.n_counting & (self.n_counting - 1):
             raise ValueError(f"n_counting must be a power of two, got {self.n_counting}")
-        for name, design in (("asm_paper", self.asm_paper), ("asm", self.asm)):
-            if design.n_candidates < design.n_largest:
+        of_designs = (
+            ("asm_paper", self.asm_paper, self.asm_paper.n_largest),
+            ("asm", self.asm, self.asm.largest(1)),
+        )
+        for name, design, largest in of_designs:
+            if design.n_candidates < largest:
                 raise ValueError(
-                    f"{name}.n_candidates must be at least {name}.n_largest = {design.n_largest}, "
+                    f"{name}.n_candidates must be at least {name}.n_largest = {largest}, "
                     f"got {design.n_candidates}: rounds cannot choose more runs than there are "
                     "candidates"
                 )
-            if design.n_largest < design.n_initial:
+            if largest < design.n_initial:
                 raise ValueError(
                     f"{name}.n_largest must be at least {name}.n_initial = {design.n_initial}, "
-                    f"got {design.n_largest}"
+                    f"got {largest}"
                 )
         return self
 
@@ -2171,6 +2193,14 @@ class Config(Parameters):
                 f"cases.{name}.random leaves only {100 * stable:.0f} % of the gains statically "
                 "stable (k_p > i0/delta0, more for the group half, k_d >= 0), expected at least "
                 "half; lower the variation, raise the mean gains or take the case away with null"
+            )
+        asm, n_quantities = self.study.asm, len(self.cases[name].random)
+        largest = asm.largest(n_quantities)
+        if "asm" in self.cases[name].methods and asm.n_candidates < largest:
+            raise ValueError(
+                f"study.asm.n_candidates must be at least {largest}, the largest number of runs of "
+                f"the {n_quantities} random quantities of cases.{name}, got {asm.n_candidates}; "
+                "set more, or study.asm.n_largest"
             )
 
     def _check_law(self, name: str, key: str) -> None:

@@ -12,7 +12,7 @@ import xarray as xr
 from formula_train import config, drawn, made
 from numpy.testing import assert_allclose, assert_array_equal
 
-from maglev import datasets
+from maglev import datasets, parameters
 from maglev.stages import design
 from maglev.vocabulary import DECISIONS, PAPER_RESPONSES
 
@@ -53,6 +53,16 @@ def test_another_largest_number_of_runs_continues_or_shortens(train, tmp_path, m
     assert len(list(tmp_path.glob("rounds/validation/*/*"))) == 1  # one and the same history
     assert few.attrs["stopped"] == "largest number of runs"
     assert_array_equal(few["decision"], [0] * (few.sizes["round"] - 1) + [3])
+
+
+@pytest.mark.parametrize(("at_least", "for_each"), [(48, 2), (40, 12)])
+def test_without_a_largest_number_runs_are_so_many_for_each_quantity(
+    train, tmp_path, monkeypatch, at_least, for_each
+):
+    monkeypatch.setattr(parameters, "LARGEST_AT_LEAST", at_least)
+    monkeypatch.setattr(parameters, "LARGEST_PER_QUANTITY", for_each)
+    one = made(config(asm={"n_largest": None, "n_initial": 40}), "asm", tmp_path)
+    assert one.sizes["sample"] == train.n_runs == 48
 
 
 def test_rounds_are_those_asked_for(train, tmp_path):

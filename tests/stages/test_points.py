@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from maglev import datasets
 from maglev.config import from_mapping
 from maglev.stages import baseline_points, points, representative_points
+from maglev.vocabulary import GAIN_KEYS
 
 
 def test_every_set_has_its_layout_and_its_size():
@@ -44,6 +45,26 @@ def test_gains_that_are_not_random_stay_at_their_means():
 def test_the_first_design_of_one_gain_is_smaller():
     one = drawn(config(), "asm", "only_guidance_proportional")["initial_points"]
     assert one.sizes == {"sample": 12, "parameter": 1}
+
+
+def test_many_quantities_keep_a_first_design_of_two_runs_for_each():
+    parts = [
+        "car_body.mass",
+        "bogie.mass",
+        "rod.mass",
+        "air_spring.stiffness",
+        "air_spring.damping",
+    ]
+    keys = [*(f"gains.{name}" for name in GAIN_KEYS), *(f"train.{part}" for part in parts)]
+    random = {key: {"coefficient_of_variation": 0.05} for key in keys}
+    for method, n in (("asm", 18), ("asm_paper", 18)):
+        few = {"n_initial": 12}
+        case = {"random": random, "methods": [method]}
+        many = from_mapping({"study": {method: few}, "cases": {"many": case}})
+        one = drawn(many, method, "many")["initial_points"]
+        assert one.sizes == {"sample": n, "parameter": 9}
+        assert_allclose(one["probability"], 1 / n)
+        assert_allclose(one["discrepancy"], 0.5 / n)
 
 
 def test_a_sample_of_the_baseline_does_not_know_how_many_there_are():

@@ -9,6 +9,7 @@ from scipy import stats
 
 from maglev.uncertainty.distributions import Marginals
 from maglev.uncertainty.pointset import (
+    COUNTED_INPUTS,
     gf_discrepancy,
     gf_points,
     rearranged,
@@ -87,6 +88,32 @@ def test_moments_are_kept_because_weights_are_not_counted_again(thousand):
     again, _, _ = voronoi_probability(thousand.points, NORMAL, np.random.default_rng(1), 2**17)
     assert np.all(again @ u**2 < 0.95)
     assert gf_discrepancy(thousand.points, again, NORMAL) > 5 * thousand.discrepancy
+
+
+@pytest.mark.parametrize("s", [1, COUNTED_INPUTS, COUNTED_INPUTS + 1, 12, 20])
+def test_many_inputs_keep_equal_weights_and_every_stratum_its_centre(s):
+    inputs, n = Marginals([stats.norm(5.0, 0.5)] * s), 100
+    found = gf_points(inputs, n, np.random.default_rng(3), counting=2**14)
+    assert_allclose(found.probability.sum(), 1.0, rtol=1e-12)
+    assert_allclose(found.discrepancy, found.probability.max() / 2, rtol=1e-9)
+    if s <= COUNTED_INPUTS:
+        assert found.n_counting == 2**14
+        assert np.ptp(found.probability) > 0.1 / n
+        return
+    assert_array_equal(found.probability, 1.0 / n)
+    assert (found.n_counting, found.n_floored, found.counting_error.max()) == (0, 0, 0.0)
+    centres = np.tile((np.arange(n)[:, None] + 0.5) / n, s)
+    assert_allclose(np.sort(inputs.to_unit_cube(found.points), axis=0), centres, rtol=1e-9)
+
+
+def test_points_of_four_inputs_are_rearranged_counted_and_rearranged_bit_by_bit():
+    n, equal = 100, np.full(100, 0.01)
+    found = gf_points(NORMAL, n, np.random.default_rng(5), counting=2**14)
+    rng = np.random.default_rng(5)
+    first = rearranged(sobol_points(NORMAL, n, rng).points, equal, NORMAL)
+    probability, _, _ = voronoi_probability(first, NORMAL, rng, 2**14)
+    assert_array_equal(found.probability, probability)
+    assert_array_equal(found.points, rearranged(first, probability, NORMAL))
 
 
 def test_voronoi_probability_on_a_line_is_the_probability_between_midpoints():

@@ -205,6 +205,38 @@ def test_kriging_likelihood_is_at_least_that_of_openturns():
         assert likelihood(found) >= likelihood(theirs) - 1e-3
 
 
+@pytest.mark.parametrize("theta", [np.zeros(8), np.log([30.0, *np.linspace(1.0, 20.0, 7)])])
+def test_likelihood_of_many_inputs_and_its_slope_are_scikit_learns(theta):
+    points = np.random.default_rng(3).standard_normal((60, 7))
+    values = np.sin(points[:, 0]) + 0.3 * points[:, 1] * points[:, 6]
+    theirs = kriging._likelihood_by_library(points, values)(theta)
+    ours = kriging._likelihood(points, values)(theta)
+    assert_allclose(ours[0], theirs[0], rtol=1e-10)
+    assert_allclose(ours[1], theirs[1], atol=1e-9 * np.abs(theirs[1]).max())
+
+
+def test_four_inputs_are_searched_by_scikit_learn_bit_by_bit(monkeypatch):
+    points = np.random.default_rng(6).standard_normal((30, 4))
+    found = fit_kriging(points, responses(points))
+    monkeypatch.setattr(kriging, "_likelihood", None)
+    again = fit_kriging(points, responses(points))
+    assert_array_equal(again.length, found.length)
+    with pytest.raises(TypeError):
+        fit_kriging(np.random.default_rng(6).standard_normal((30, 5)), responses(points))
+
+
+def test_search_in_many_inputs_ends_where_that_of_scikit_learn_does(monkeypatch):
+    points = np.random.default_rng(4).standard_normal((60, 6))
+    values = responses(points)
+    ours = fit_kriging(points, values)
+    monkeypatch.setattr(kriging, "SEARCHED_BY_LIBRARY", 6)
+    theirs = fit_kriging(points, values)
+    scale = values.std(axis=0)
+    elsewhere = np.random.default_rng(5).standard_normal((17, 6))
+    assert (np.abs(ours.predict(elsewhere) - theirs.predict(elsewhere)) < 1e-3 * scale).all()
+    assert_allclose(np.log(ours.length[:, :2]), np.log(theirs.length[:, :2]), atol=0.02)
+
+
 def test_kriging_deviation_is_zero_at_samples_and_covers_the_error():
     surrogate = fit_kriging(POINTS, VALUES)
     scale = VALUES.std(axis=0)

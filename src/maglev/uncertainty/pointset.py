@@ -1,7 +1,7 @@
 """Point sets of random inputs with an assigned probability per point.
 
-``gf_points`` lowers the GF-discrepancy by rearrangement; ``sobol_points`` and
-``latin_hypercube_points`` are one-stage sets of equal weights.  Theory: docs/theory/point_sets.md.
+``gf_points`` lowers the GF-discrepancy by rearrangement; ``sobol_points`` is a one-stage set of
+equal weights.  Theory: docs/theory/point_sets.md.
 """
 
 from __future__ import annotations
@@ -20,6 +20,11 @@ from maglev.uncertainty.distributions import Marginals
 
 COUNTING_POINTS = 2**20
 """Counting points per set: relative counting error below 10 % for a cell of probability 1e-4."""
+
+COUNTED_INPUTS = 4
+"""Largest number of inputs whose Voronoi cells are counted.  With more, a few cells near the mean
+take most of the probability (of 1000 points, those of 20 inputs are worth 480 of equal weight), and
+points of equal weight are the more accurate ones: docs/benchmarks/many.md."""
 
 _SOBOL_BITS = 30  # scipy.stats.qmc.Sobol's own default: points are multiples of 2**-30
 _CHUNK = 2**16  # counting points held in memory at once, assumed
@@ -61,11 +66,12 @@ class PointSet:
 def gf_points(
     marginals: Marginals, n: int, rng: np.random.Generator, counting: int = COUNTING_POINTS
 ) -> PointSet:
-    """GF-discrepancy point set: scrambled Sobol' points, rearranged twice.
+    """GF-discrepancy point set: scrambled Sobol' points, rearranged.
 
-    The points are rearranged with equal weights, then with the probabilities of their Voronoi
-    cells, which are counted once in between (a second count would spoil the moments).  The
-    discrepancy of the result is half the largest assigned probability.
+    The points are rearranged with equal weights, then, of up to ``COUNTED_INPUTS`` inputs, with the
+    probabilities of their Voronoi cells, which are counted once in between (a second count would
+    spoil the moments).  Points of more inputs keep their equal weights.  The discrepancy of the
+    result is half the largest assigned probability.
 
     Parameters
     ----------
@@ -76,12 +82,13 @@ def gf_points(
     rng
         Source of the scrambling of both the points and the counting points.
     counting
-        Number of counting points, a power of two, at least ``n``.
+        Number of counting points, a power of two, at least ``n``; of no effect on points that keep
+        equal weights.
 
     Returns
     -------
     point_set
-        The points of the second rearrangement with the probabilities counted before it.
+        The points of the last rearrangement with the probabilities that it was made with.
 
     Raises
     ------
@@ -108,6 +115,8 @@ def gf_points(
     _check_size(n)
     equal = np.full(n, 1.0 / n)
     first = rearranged(marginals.from_unit_cube(_sobol_unit(marginals.n, n, rng)), equal, marginals)
+    if marginals.n > COUNTED_INPUTS:
+        return _equal_weights(first, marginals)
     probability, counting_error, n_floored = voronoi_probability(first, marginals, rng, counting)
     points = rearranged(first, probability, marginals)
     return PointSet(
@@ -157,7 +166,7 @@ def sobol_points(marginals: Marginals, n: int, rng: np.random.Generator) -> Poin
     array([0.25, 0.25, 0.25, 0.25])
     """
     _check_size(n)
-    return _equal_weights(_sobol_unit(marginals.n, n, rng), marginals)
+    return _equal_weights(marginals.from_unit_cube(_sobol_unit(marginals.n, n, rng)), marginals)
 
 
 def rearranged(points: npt.ArrayLike, weights: npt.ArrayLike, marginals: Marginals) -> FloatArray:
@@ -353,9 +362,8 @@ def _sobol_unit(dimension: int, n: int, rng: np.random.Generator) -> FloatArray:
     return sobol.random_base2((n - 1).bit_length())[:n] + 0.5 ** (_SOBOL_BITS + 1)
 
 
-def _equal_weights(unit: FloatArray, marginals: Marginals) -> PointSet:
-    n = len(unit)
-    points = marginals.from_unit_cube(unit)
+def _equal_weights(points: FloatArray, marginals: Marginals) -> PointSet:
+    n = len(points)
     probability = np.full(n, 1.0 / n)
     return PointSet(
         points=points,
