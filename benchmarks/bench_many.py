@@ -441,7 +441,8 @@ def page_of_trains(rows: pd.DataFrame) -> list[str]:
         "ones: nearly a sum, lognormal, a ratio, peaks that take over, a resonance, a largest",
         "value over time (`train` in the script).  One design of the shipped settings serves all;",
         "the error is that of Kriging on the same points as the truth, largest of the six, in",
-        "standard deviations: median / worst of the seeds.",
+        "standard deviations: median / worst of the seeds.  Trains of different sizes are different",
+        "functions: strong quantities of the responses overlap where there are few.",
         "",
     ]
     for s, of in worst.groupby("quantities"):

@@ -986,7 +986,8 @@ SurrogateKind = Literal[Surrogate, "best"]
 
 LARGEST_AT_LEAST, LARGEST_PER_QUANTITY = 104, 20
 """Largest number of runs of an adaptive design of ours where none is given: at least, and for each
-random quantity; docs/benchmarks/many.md."""
+random quantity.  Limits of twelve are within 0.15 σ by it (docs/benchmarks/many.md); that it serves
+more as well is assumed."""
 
 _COUNTED = 2**14
 """Largest GF point set, and smallest number of points that count its Voronoi cells; assumed."""
