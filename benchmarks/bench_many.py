@@ -441,8 +441,8 @@ def page_of_trains(rows: pd.DataFrame) -> list[str]:
         "ones: nearly a sum, lognormal, a ratio, peaks that take over, a resonance, a largest",
         "value over time (`train` in the script).  One design of the shipped settings serves all;",
         "the error is that of Kriging on the same points as the truth, largest of the six, in",
-        "standard deviations: median / worst of the seeds.  Trains of different sizes are different",
-        "functions: strong quantities of the responses overlap where there are few.",
+        "standard deviations: median / worst of the seeds.  Trains of different sizes are",
+        "different functions: strong quantities of the responses overlap where there are few.",
         "",
     ]
     for s, of in worst.groupby("quantities"):
@@ -491,7 +491,7 @@ def draw(worst: pd.Series, page: Path) -> None:
             axis.semilogy(of.index, of, color="0.7", lw=0.7)
             axis.semilogy(of.index, of.median(axis=1), color="C0", lw=1.6, label="median")
             axis.axhline(WITHIN, color="C1", lw=1.0, ls="--", label=f"{WITHIN:g} σ")
-            axis.set(title=f"{s} quantities", xlabel="runs of the model")
+            axis.set(title=f"{s} quantities", xlabel="runs of the model", ylim=(0.03, 4.0))
         np.atleast_1d(axes)[0].set_ylabel(f"largest error at {EXCEEDANCES[-1]:g} [σ]")
         np.atleast_1d(axes)[0].legend(fontsize=6)
         figure.savefig(page.with_suffix(".png"), dpi=200)
