@@ -203,7 +203,7 @@ def cost_words(config: Config, case: str) -> str:
         return ""
     chosen = case_of(config, case)
     runs = sum(
-        n_samples(config, case) if method == BASELINE else _largest(config, method)
+        n_samples(config, case) if method == BASELINE else _largest(config, method, len(laws))
         for method in chosen.possible_methods
     )
     values = [laws[key] for key in dear]
@@ -215,10 +215,12 @@ def cost_words(config: Config, case: str) -> str:
     )
 
 
-def _largest(config: Config, method: str) -> int:
+def _largest(config: Config, method: str, n_quantities: int) -> int:
     """Largest number of runs of a method with a surrogate."""
-    design = getattr(config.study, method)
-    return int(design.n_runs if method == "osm" else design.n_largest)
+    study = config.study
+    if method == "asm":
+        return study.asm.largest(n_quantities)
+    return study.osm.n_runs if method == "osm" else study.asm_paper.n_largest
 
 
 def n_samples(config: Config, case: str) -> int:
