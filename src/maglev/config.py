@@ -6,7 +6,6 @@ A configuration file says only what differs from the defaults, or from the file 
 
 from __future__ import annotations
 
-import copy
 import csv
 import difflib
 import math
@@ -213,25 +212,13 @@ def from_mapping(mapping: Mapping[str, Any]) -> Config:
     for path, name in named_files(mapping):
         if not Path(name).is_file():
             raise ConfigError(f"{'.'.join(path)} names a file that does not exist: {name}")
-        if path[-1] == "file":
-            whole = _with_sample(whole, path[:-1], name)
+        if path[-1] == "file":  # the values of a sample stand in place of its file
+            nested: Any = {"file": None, "values": sample_values(name)}
+            for part in reversed(path[:-1]):
+                nested = {part: nested}
+            whole = overlay(whole, nested)
     config: Config = validated(Config, whole)
     return config
-
-
-def _with_sample(whole: dict[str, Any], path: Sequence[str], name: str) -> dict[str, Any]:
-    """The values of a sample in place of the name of its file."""
-    law: Any = whole
-    for part in path:
-        law = law[part]
-    held = {key: value for key, value in law.items() if key != "file"}
-    nested: Any = {**held, "values": sample_values(name)}
-    *outer, last = path
-    target = whole = copy.deepcopy(whole)
-    for part in outer:
-        target = target[part]
-    target[last] = nested
-    return whole
 
 
 def sample_values(path: str | Path) -> list[str | float]:

@@ -177,8 +177,9 @@ def others_at(config: Config, case: str, values: FloatArray) -> dict[str, FloatA
     }
 
 
-PREPARATION = 0.5
-"""Process time of a system that is built anew, with five spans [s]; docs/benchmarks/passage.md."""
+PREPARATION = 0.7
+"""Process time of a system built anew for one sample, with five spans [s]: 0.3 to prepare it, 0.4
+for a row of sixteen that one sample fills (docs/benchmarks/passage.md)."""
 
 
 def cost_words(config: Config, case: str) -> str:
@@ -211,7 +212,7 @@ def cost_words(config: Config, case: str) -> str:
         runs = min(runs, math.prod(len(law.values) for law in values if isinstance(law, Discrete)))
     return (
         f"{', '.join(dear)}: every value asks for a system built anew, {runs} of them, about "
-        f"{runs * PREPARATION / 60:.0f} min of one core beside the passages"
+        f"{runs * PREPARATION / 60:.0f} min of one core"
     )
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +17,7 @@ from scipy.special import ndtr
 
 from maglev.arrays import FloatArray
 from maglev.errors import UserError
+from maglev.laws import Distribution
 
 N_TERMS = 120
 """Hermite polynomials of an expansion [-]; assumed: a smooth law needs ten, one with steps many."""
@@ -29,23 +29,7 @@ N_NODES = 3601
 """Nodes of the sums over a normal variate [-]; assumed: two hundred in a deviation."""
 
 
-class Law(Protocol):
-    """What is asked of the law of one quantity."""
-
-    def mean(self) -> float:
-        """Mean."""
-
-    def std(self) -> float:
-        """Standard deviation."""
-
-    def ppf(self, q: npt.ArrayLike) -> Any:
-        """Quantiles."""
-
-    def isf(self, q: npt.ArrayLike) -> Any:
-        """Quantiles by the probability above."""
-
-
-def at_normal(law: Law, variate: npt.ArrayLike) -> FloatArray:
+def at_normal(law: Distribution, variate: npt.ArrayLike) -> FloatArray:
     """Quantity of a law at normal variates of the same probability.
 
     Parameters
@@ -83,7 +67,7 @@ class Nataf:
         Lower triangle that makes the correlated normal variates of independent ones [-].
     """
 
-    laws: tuple[Law, ...]
+    laws: tuple[Distribution, ...]
     root: FloatArray
 
     def physical(self, standard: npt.ArrayLike) -> FloatArray:
@@ -104,7 +88,7 @@ class Nataf:
         return np.column_stack([at_normal(law, column) for law, column in pairs])
 
 
-def nataf(laws: Sequence[Law], correlation: npt.ArrayLike, names: Sequence[str]) -> Nataf:
+def nataf(laws: Sequence[Distribution], correlation: npt.ArrayLike, names: Sequence[str]) -> Nataf:
     """Transformation to quantities with given laws and linear correlation.
 
     Parameters
@@ -167,7 +151,7 @@ def nataf(laws: Sequence[Law], correlation: npt.ArrayLike, names: Sequence[str])
     return Nataf(tuple(laws), root)
 
 
-def _hermite(law: Law) -> FloatArray:
+def _hermite(law: Distribution) -> FloatArray:
     """Coefficients (term,) of a standardised quantity in normalised Hermite polynomials, from 1."""
     u = np.linspace(-REACH, REACH, N_NODES)
     weight = np.exp(-0.5 * u**2) / np.sqrt(2.0 * np.pi) * (u[1] - u[0])
