@@ -11,14 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from maglev.units import in_unit
 
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-LAWS = (
+Name = Literal[
     "normal",
     "lognormal",
     "uniform",
@@ -30,8 +30,8 @@ LAWS = (
     "quantiles",
     "sample",
     "discrete",
-)
-"""The laws by name; a space may stand for the underscore."""
+]
+"""The laws by name; a configuration may write a space for the underscore."""
 
 LEAST_SAMPLE = 10
 """Fewest values that a sample may have [-]; assumed."""
@@ -179,7 +179,7 @@ def distribution(law: Any, present: float, unit: str, key: str) -> Distribution:
     --------
     >>> from maglev.parameters import Law
     >>> law = Law(law="uniform", low="29 t", high="39 t")
-    >>> distribution(law, 39e3, "kg", "train.car_body.mass").mean()
+    >>> float(distribution(law, 39e3, "kg", "train.car_body.mass").mean())
     34000.0
     """
     return _MAKERS[law.law](_Numbers(law, present, unit, key))

@@ -1380,19 +1380,7 @@ _RESERVED = ("config", "track", "guideway", "train", "figures", "tables", "check
 class Law(Parameters):
     """Law of one random quantity: mean and deviation, bounds, or a table."""
 
-    law: Literal[
-        "normal",
-        "lognormal",
-        "uniform",
-        "triangular",
-        "truncated_normal",
-        "gumbel",
-        "weibull",
-        "beta",
-        "quantiles",
-        "sample",
-        "discrete",
-    ] = Field("normal", description="name of the law")
+    law: laws.Name = Field("normal", description="name of the law")
     mean: float | str | None = Field(
         None, description="mean, with its unit; left out: the configured value"
     )
