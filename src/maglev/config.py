@@ -238,6 +238,15 @@ def sample_values(path: str | Path) -> list[str | float]:
     ------
     ConfigError
         If there is no heading, or a line begins with something else than a finite number.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "masses.csv"
+    ...     _ = path.write_text("mass [t]\\n29.5\\n31\\n")
+    ...     sample_values(path)
+    ['29.5 t', '31.0 t']
     """
     with Path(path).open(encoding="utf-8-sig", newline="") as stream:
         rows = [row for row in csv.reader(stream) if row and any(cell.strip() for cell in row)]
@@ -327,6 +336,15 @@ def layered(
     ------
     ConfigError
         As `read_overlays`.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     low, path = Path(folder) / "low.yaml", Path(folder) / "over.yaml"
+    ...     _ = low.write_text("{seed: 1, run: low}"), path.write_text("seed: 2")
+    ...     layered([path], {"run": "mine"}, low)
+    {'seed': 2, 'run': 'mine'}
     """
     near = [os.path.relpath(path) for path in paths]
     below = {} if any("extends" in read_yaml(path) for path in near) else read_overlays(lowest)

@@ -12,8 +12,8 @@ from maglev.uncertainty.checked import (
     Proxy,
     Runs,
     Settings,
+    _counted,
     checked,
-    counted,
     kriging_proxy,
     planned,
     thinned,
@@ -70,7 +70,7 @@ def test_the_estimate_is_unbiased_whatever_the_surrogate(proxy, refuted):
         rng = np.random.default_rng(seed)
         plan = planned(proxy, before, asked, 48, Settings(n_population=2**11), rng)
         outcome = runs_at(first_input, plan.points)
-        found.append(counted([plan], [outcome], asked, 56).states["beyond"])
+        found.append(_counted([plan], [outcome], asked, 56).states["beyond"])
     probability = [one.probability for one in found]
     assert abs(np.mean(probability) - norm.sf(2.0)) < 3.0 * np.std(probability) / np.sqrt(60)
     inside = [one.lower <= norm.sf(2.0) <= one.upper for one in found if one.status == GIVEN]

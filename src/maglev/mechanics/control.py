@@ -210,7 +210,13 @@ def _halving(n: int) -> IntArray:
 
 
 def first_moving_step(control: Control, first_step: int) -> int:
-    """Number of the first step on which anything moves: with failed magnets, the first of all."""
+    """Number of the first step on which anything moves: with failed magnets, the first of all.
+
+    Examples
+    --------
+    >>> first_moving_step(Control(), 700)
+    700
+    """
     fails = control.suspension.failed_magnets or control.guidance.failed_magnets
     return 1 if fails else first_step
 
@@ -222,6 +228,10 @@ def refuse_too_many(n_failed: npt.ArrayLike, n_magnets: int, *, guidance: bool) 
     ------
     UserError
         If a number of failed magnets exceeds ``n_magnets``.
+
+    Examples
+    --------
+    >>> refuse_too_many(2, 80, guidance=False)  # nothing to refuse
     """
     most = int(np.max(n_failed))
     if most > n_magnets:
@@ -249,6 +259,12 @@ def without_current(
     ------
     UserError
         If more fail than there are.
+
+    Examples
+    --------
+    >>> x, side = np.tile([-1.0, -2.0, -3.0], 2), np.repeat([1, -1], 3)
+    >>> without_current(Circuit(failed_magnets=1), x, side, guidance=False).tolist()
+    [False, True, False, False, False, False]
     """
     refuse_too_many(circuit.failed_magnets, x.size, guidance=guidance)
     failed = np.zeros(x.size, dtype=bool)

@@ -454,7 +454,13 @@ def _factors(matrix: sparse.csc_array) -> SuperLU:
 
 
 def rigid_arm(dy: float, dz: float) -> FloatArray:
-    """Six motions at a point (0, dy, dz) from those of the node that carries it rigidly."""
+    """Six motions at a point (0, dy, dz) from those of the node that carries it rigidly.
+
+    Examples
+    --------
+    >>> float(rigid_arm(1.1, 0.0)[Z, ROLL])  # a turn to the right lowers the right rail
+    1.1
+    """
     arm = np.eye(6)
     arm[X, PITCH], arm[X, YAW] = dz, -dy
     arm[Y, ROLL] = -dz
@@ -476,7 +482,14 @@ def _scattered(blocks: FloatArray, dof: IntArray, n: int) -> sparse.csr_array:
 
 
 def one_span(guideway: Guideway) -> SpanModel:
-    """One span: girder and two rails, the arms between them eliminated."""
+    """One span: girder and two rails, the arms between them eliminated.
+
+    Examples
+    --------
+    >>> span = one_span(Guideway())
+    >>> float(span.node_x.max())
+    24.768
+    """
     rail, r = guideway.rail, guideway.refinement
     n = rail.units_per_span * rail.connectors_per_unit
     half = guideway.span_length / (2 * n)  # half a connector spacing: every node is a multiple
@@ -563,7 +576,13 @@ def one_span(guideway: Guideway) -> SpanModel:
 
 
 def pier_section(pier: Pier, width_y: float) -> BeamSection:
-    """Section of a pier in the axes of a beam that runs downwards (its z is -x of the guideway)."""
+    """Section of a pier in the axes of a beam that runs downwards (its z is -x of the guideway).
+
+    Examples
+    --------
+    >>> round(pier_section(Pier(), 1.8).area, 2)
+    3.24
+    """
     wx, wy = pier.width_x, width_y
     about_y, about_x = wy * wx**3 / 12, wx * wy**3 / 12
     return BeamSection.model_construct(
@@ -616,7 +635,14 @@ def rectangle_torsion_constant(width: float, depth: float) -> float:
 
 
 def one_pier(guideway: Guideway) -> tuple[sparse.csr_array, sparse.csr_array, FloatArray]:
-    """Mass, stiffness and depth below the top [m] of a pier's nodes, foot left out."""
+    """Mass, stiffness and depth below the top [m] of a pier's nodes, foot left out.
+
+    Examples
+    --------
+    >>> mass, stiffness, depth = one_pier(Guideway())
+    >>> mass.shape == stiffness.shape == (6 * depth.size, 6 * depth.size)
+    True
+    """
     pier, r = guideway.pier, guideway.refinement
     cap = math.ceil(pier.cap_height / PIER_ELEMENT - 1e-9) * r
     shaft = math.ceil((pier.height - pier.cap_height) / PIER_ELEMENT - 1e-9) * r

@@ -265,7 +265,13 @@ _FOUND: Mapping[Response, Callable[[Passages], Found]] = {
 
 
 def not_judged(config: Config, n_samples: int) -> Passages:
-    """Passages without histories of a system for which the step is too large."""
+    """Passages without histories of a system for which the step is too large.
+
+    Examples
+    --------
+    >>> not_judged(Config(), 2).status.tolist()
+    [4, 4]
+    """
     n_cars = config.train.n_cars
     more = {
         "girder": (4,),
@@ -301,6 +307,12 @@ def in_their_order(parts: Sequence[Passages], rows: Sequence[IntArray]) -> Passa
     -------
     passages
         Of all samples in order; a car that a train does not have is NaN.
+
+    Examples
+    --------
+    >>> parts = [not_judged(Config(), 1), not_judged(Config(), 2)]
+    >>> in_their_order(parts, [np.array([1]), np.array([0, 2])]).status.size
+    3
     """
     order = np.argsort(np.concatenate(rows), kind="stable")
 

@@ -109,6 +109,15 @@ def influence(guideway: GuidewayModel, train: TrainModel, step: float = 0.5) -> 
     -------
     influence : (nose, magnet, pole)
         Of the suspension magnets [m/N]; zero of the others.
+
+    Examples
+    --------
+    >>> from maglev.mechanics import guideway, train
+    >>> from maglev.parameters import Guideway, Train
+    >>> models = guideway.build(Guideway(n_spans=1)), train.build(Train(n_cars=1))
+    >>> found = influence(*models)
+    >>> bool(0.0 < found.max() < 1e-8)  # metres a newton
+    True
     """
     length = guideway.parameters.length + train.parameters.length
     nose = np.arange(0.0, length + step, step)

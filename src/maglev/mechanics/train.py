@@ -161,6 +161,12 @@ def assemble(train: Train) -> tuple[Assembly, list[Car], list[tuple[int, HungMag
     """Bodies and links of the train, its cars, and the car and freedoms of each magnet.
 
     Magnets are in the order of `MagnetTable`.
+
+    Examples
+    --------
+    >>> assembly, cars, magnets = assemble(Train(n_cars=2))
+    >>> len(cars)
+    2
     """
     assembly = Assembly()
     cars: list[Car] = []

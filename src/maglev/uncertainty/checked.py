@@ -393,7 +393,7 @@ def checked(
         outcomes.append(outcome)
         sofar = sofar.and_of(outcome)
         unvisited = _unvisited(sofar, seed)
-        answer = replace(counted(plans, outcomes, asked, sofar.lost.size), unvisited=unvisited)
+        answer = replace(_counted(plans, outcomes, asked, sofar.lost.size), unvisited=unvisited)
         if unvisited <= min(asked.levels) and _known(answer, asked, sofar):
             return replace(answer, stopped="known_as_asked")
     if answer is None:
@@ -645,7 +645,7 @@ def tail_population(
     return _population(n, centres, rng)
 
 
-def counted(plans: Sequence[Plan], outcomes: Sequence[Runs], asked: Asked, n_runs: int) -> Answer:
+def _counted(plans: Sequence[Plan], outcomes: Sequence[Runs], asked: Asked, n_runs: int) -> Answer:
     """What batches and their outcomes say.
 
     Parameters

@@ -579,6 +579,13 @@ def checked_histories(
     UserError
         If a shape is wrong, a history is not finite while it is there, probabilities are negative
         or do not sum to one, or a last time is none of the times.
+
+    Examples
+    --------
+    >>> given = [[0.0, 1.0, 2.0], [0.0, 3.0, np.nan]]
+    >>> histories, probability, until = checked_histories(given, None, [2, 1])
+    >>> histories[1].tolist(), probability.tolist()
+    ([0.0, 3.0, 3.0], [0.5, 0.5])
     """
     histories = np.asarray(histories, dtype=float)
     if histories.ndim != 2 or histories.shape[0] < 1 or histories.shape[1] < 2:
@@ -692,7 +699,13 @@ def _mesh_by_rule(
 
 
 def margin_of(n_steps: int) -> int:
-    """Cells beyond the farthest value: eight deviations of the widest (upwind) kernel."""
+    """Cells beyond the farthest value: eight deviations of the widest (upwind) kernel.
+
+    Examples
+    --------
+    >>> margin_of(100)
+    44
+    """
     return int(np.ceil(4.0 * np.sqrt(n_steps))) + 4  # variance n c (1 - c) <= n / 4, scheme's reach
 
 
@@ -715,6 +728,11 @@ def limiter_code(limiter: str) -> int:
     ------
     UserError
         If there is no such limiter.
+
+    Examples
+    --------
+    >>> limiter_code("superbee") in _LIMITERS.values()
+    True
     """
     if limiter not in _LIMITERS:
         raise UserError(f"limiter must be one of {', '.join(_LIMITERS)}, got {limiter!r}")
